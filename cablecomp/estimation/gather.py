@@ -150,7 +150,7 @@ def _fine(
     span = time[:, -1] - time[:, 0]
     near = span <= APART * np.median(span)
     means = {k: group_means(v[:whole], group)[near] for k, v in raw.items()}
-    read = {k: (group_means(v[:whole].astype(np.float64), group) > 0.99)[near] for k, v in finite.items()}
+    read = {k: _read(raw["time_s"][:whole], v[:whole], group)[near] for k, v in finite.items()}
     for key in raw:
         is_input = key != "time_s" and (key not in OUTPUTS or key == load)
         if is_input and np.ptp(means[key]) > 0.0:
@@ -158,6 +158,17 @@ def _fine(
     if load == MOTOR:
         read.pop(MOTOR)
     return means, read
+
+
+def _read(time: FloatArray, read: BoolArray, group: int) -> BoolArray:
+    """Which means of so many rows are of readings: those of readings alone or, where few are (an output of a lower
+    rate, one that loses many), those that hold one and bridge no hole."""
+    share = group_means(read.astype(np.float64), group)
+    alone = share > 0.99
+    if np.mean(alone) > SPARSE or not read.any():
+        return alone
+    between = group_means(_between(time, time[read]).astype(np.float64), group) > 0.99
+    return np.asarray(alone | ((share > 0.0) & between), dtype=np.bool_)
 
 
 def _weight(time: FloatArray, rows: IntArray) -> FloatArray:

@@ -184,6 +184,21 @@ def test_a_motor_that_was_read_at_first_only_drives_nothing_later() -> None:
     assert np.mean(np.isin(columns["time_s"][:397], time)) > 0.95
 
 
+def test_an_output_of_a_lower_rate_counts_where_means_of_many_rows_hold_a_reading_of_it() -> None:
+    """Every tenth row, of means of four; not over a hole, nor after the last reading."""
+    columns = recorded()
+    n = len(columns["time_s"])
+    read = np.arange(n) % 10 == 0
+    read[400:600] = False
+    seldom = {**columns, "joint_position_rad": np.where(read, columns["joint_position_rad"], np.nan)}
+    e = gather(JOINT, "one", seldom, "s", fine_rows=n // 4, judged_rows=200)
+    assert e.group == pytest.approx(4.0, rel=0.01)
+    held = {int(k) // 4 for k in np.flatnonzero(read)}
+    whole = {g for g in held if 4 * g + 3 <= 390 or (4 * g >= 600 and 4 * g + 3 <= 990)}
+    assert set(np.flatnonzero(e.read["joint_position_rad"])) == whole
+    assert e.counted["joint_position_rad"].sum() > 40
+
+
 def test_a_motor_and_a_load_that_were_never_read_together_are_said_to_be() -> None:
     columns = recorded()
     columns["motor_position_rad"][500:] = np.nan
