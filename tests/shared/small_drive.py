@@ -20,9 +20,11 @@ TOLERANT = parse_joint(
 )
 
 
-def course(seconds: float, loads: float = 1.0) -> tuple[FloatArray, FloatArray, FloatArray]:
+def course(
+    seconds: float, loads: float = 1.0, step_s: float = STEP_S
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Time [s], motor angle [rad] and load [N m], from rest."""
-    time = np.arange(0.0, seconds, STEP_S)
+    time = np.arange(0.0, seconds, step_s)
     soft = 1.0 - np.exp(-time)
     motor = soft * (0.8 * np.sin(1.1 * time) + 0.5 * np.sin(2.1 * time))
     load = loads * soft * (0.9 * np.sin(1.7 * time) + 0.6 * np.sin(2.9 * time))
@@ -61,12 +63,13 @@ class Case(NamedTuple):
     loads: float = 1.0
     form: str = ""
     plant: str = ""  # what the plant calls it, if not the effect's name and form
+    step_s: float = STEP_S
 
 
 def recording(effect: str, case: Case) -> dict[str, FloatArray]:
-    """25 Hz of the plant with the effect: both pulleys turning, load of two frequencies, noise on all channels."""
+    """The plant with the effect: both pulleys turning, load of two frequencies, noise on all channels."""
     rng = np.random.default_rng(3)
-    time, motor, load = course(case.seconds, case.loads)
+    time, motor, load = course(case.seconds, case.loads, case.step_s)
     given: dict[str, Any] = {
         "temperature_degC": 20.0 + 4.0 * np.sin(0.9 * time),
         "other_1": np.sin(1.3 * time),
