@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
-os.environ.setdefault(
-    "OPENBLAS_NUM_THREADS", "1"
-)  # the workers share the cores; threads of each would only wait
+# the workers share the cores; threads of each, of linear algebra or of fits side by side, would only wait
+for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+    os.environ.setdefault(threads, "1")
 
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
