@@ -35,10 +35,10 @@ def joint() -> JointConfig:
 def recording(
     effects: list[EffectSpec], seed: int = 3, tighter: float = 1.0, noise: Mapping[str, float] = SMALL_NOISE
 ) -> dict[str, FloatArray]:
-    """24 s at 50 Hz of the plant: both pulleys turning, load of two frequencies, noise on all channels; cables
+    """24 s at 25 Hz of the plant: both pulleys turning, load of two frequencies, noise on all channels; cables
     `tighter` times as tight as they are meant to be."""
     rng = np.random.default_rng(seed)
-    time = np.arange(0.0, 24.0, 0.02)
+    time = np.arange(0.0, 24.0, 0.04)
     soft = 1.0 - np.exp(-time)
     motor = soft * (0.8 * np.sin(1.1 * time) + 0.5 * np.sin(2.1 * time))
     load = soft * (0.9 * np.sin(1.7 * time) + 0.6 * np.sin(2.9 * time))
