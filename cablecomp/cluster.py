@@ -91,6 +91,8 @@ def _in_processes(
             for k in islice(waiting, count):
                 running[pool.submit(_told, work, left[k])] = k
                 begun.append(k)
+            # who watches the pool's processes looks for new ones as work is handed in, before it starts one for it
+            pool.submit(int)
             while running:
                 finished = next(iter(wait(running, return_when=FIRST_COMPLETED).done))
                 number, (result, failed) = running.pop(finished), finished.result()
