@@ -153,9 +153,27 @@ def forgotten(
         return Forgotten(0, 0.0, 0.0)
     apart = np.stack([run[JOINT] for run in runs.of_history])
     first, left = _first_row(apart, share * size[JOINT], after)
-    constant = float(np.sqrt(np.mean(apart[:, first:].mean(axis=1) ** 2)))
     hidden = _hidden(recording, runs, first)
-    return Forgotten(first, left, constant, _carried_over(runs, hidden, first, size), hidden)
+    return Forgotten(first, left, _constant(apart, first), _carried_over(runs, hidden, first, size), hidden)
+
+
+def zero_by_history(fit: Fit) -> float:
+    """By how much the assumed histories move a recording's zero (RMS, rad; mean over the recordings) by this fit's own
+    drive: a drive without the law that is missing may keep what the law forgets."""
+    problem = fit.problem
+
+    def constant(e: Evidence) -> float:
+        runs = _apart(problem, fit.x, e, (JOINT,), ())
+        if not runs.of_history:
+            return 0.0
+        return _constant(_of(runs.of_history, JOINT).T, int(np.argmax(e.counted[JOINT])))
+
+    return float(np.mean(in_processes(constant, problem.evidence)))
+
+
+def _constant(apart: FloatArray, first: int) -> float:
+    """How far histories (k x rows) are apart in the mean from row `first` on (RMS)."""
+    return float(np.sqrt(np.mean(apart[:, first:].mean(axis=1) ** 2)))
 
 
 def _hidden(recording: Evidence, runs: Runs, first: int) -> tuple[int, ...]:

@@ -208,10 +208,9 @@ def weighed(fit: Fit, floor: Weighing) -> Weighing:
             zero_sd[c] = max(seen, floor.zero_sd.get(c, 0.0))
             if scatter.moved is None:
                 anew = set_anew(problem, c, zeros, left[c], floor.history.get(c, 0.0))
-                far = max(sigma[c], zero_sd[c])
             else:
-                anew, far = scatter.moved, zero_sd[c]
-            moved[c] = dict.fromkeys(anew, MOVED_SD * far)
+                anew = scatter.moved
+            moved[c] = dict.fromkeys(anew, MOVED_SD * max(sigma[c], zero_sd[c]))
     return Weighing(sigma, zero_sd, moved, floor.history)
 
 

@@ -19,9 +19,11 @@ INSTANT_STEP_S: Final = 0.05
 """Step of the difference quotient by an event's instant: it has to move over rows that are thinned by travel."""
 INSTANT_REACH_S: Final = 3.0
 """How far an event's instant may move from where it was found by asking."""
-ZERO: Final = 0.5
-"""How far recordings' zeros may depart from their session's, in what a model leaves (RMS): more would take up
-what compliances do."""
+ZERO: Final = 0.1
+"""How far recordings' zeros may depart from their session's, in what a model leaves (RMS): more takes up what
+compliances do (with half of it zeros of a jaw's recordings followed the load by 0.7 degrees)."""
+ZERO_FAINT: Final = 0.1
+"""The same at least, in a reading's noise."""
 TELLING: Final = 4
 """Recordings, beyond sessions and coefficients by load, from which their zeros tell what follows the load and what was
 set anew."""

@@ -22,7 +22,8 @@ from cablecomp.diagnosis.pace import Pace
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import with_effects
 from cablecomp.errors import InputError
-from cablecomp.estimation.least_squares import Fit, covariance, solve, weighed
+from cablecomp.estimation.history import zero_by_history
+from cablecomp.estimation.least_squares import Fit, covariance, rms_left, solve, weighed
 
 FREE = JOINT.model_copy(update={"tolerance": {"EA_N": 0.1}})
 WEIGHT = {"moment_Nm": 0.3, "phase_rad": 0.6}
@@ -96,6 +97,17 @@ def test_a_last_fit_that_cannot_be_followed_leaves_the_model_as_it_was_found(
     monkeypatch.setattr(search_module, "refit", stranded)
     found = search_module._settled((), drive.fit, drive, make_groups(drive.fit))
     assert found.fit is drive.fit
+
+
+def test_how_far_zeros_may_move_in_the_last_fit_is_told_by_its_own_drive(
+    heavy: tuple[Calibrated, Search],
+) -> None:
+    """Whatever a drive without the weight would keep of its history (0.02 rad here)."""
+    drive, found = heavy
+    keeps = replace(drive, floor=replace(drive.floor, zero_sd={"joint_position_rad": 0.02}))
+    fit = search_module._settled(found.final.terms, found.final.fit, keeps, found.groups).fit
+    assert fit.problem.weighing.zero_sd["joint_position_rad"] == pytest.approx(zero_by_history(fit), rel=0.05)
+    assert rms_left(fit) == pytest.approx(rms_left(found.final.fit), rel=0.05)
 
 
 def test_done_without_a_term_the_model_is_fitted_again(heavy: tuple[Calibrated, Search]) -> None:

@@ -11,9 +11,11 @@ import pytest
 from joints import LONG, closed
 
 from cablecomp.config import parse_joint
+from cablecomp.estimation import history
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.gather import gather
-from cablecomp.estimation.history import Forgotten, forgotten
+from cablecomp.estimation.history import Forgotten, forgotten, histories, zero_by_history
+from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.parameter import of_drive
 from cablecomp.estimation.problem import Problem, Weighing
 from cablecomp.signal.smoothing import FloatArray
@@ -76,6 +78,30 @@ def test_what_a_nested_history_leaves_in_the_plant_lies_within_what_is_estimated
     after = [float(np.std(without_told(found, a))) for a in added]
     assert max(before) > 4.0 * NOISE_RAD
     assert max(after) < 0.1 * max(before) + 0.2 * NOISE_RAD
+
+
+def test_how_far_histories_move_a_zero_is_how_far_they_do_in_the_plant(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The mean angle of a recording after each assumed history, played to the plant, less that after none (RMS)."""
+    monkeypatch.setattr(history, "HISTORY_PARTS", (1.0,))
+    raw, plant, motor, load = nested("closed")
+
+    def played(path: FloatArray) -> FloatArray:
+        drive, loads = (np.concatenate([path[:, k], v]) for k, v in enumerate((motor, load)))
+        return simulate(plant, STEP_S * np.arange(len(drive)), drive, loads).channels()[JOINT][len(path) :]
+
+    fresh = played(np.empty((0, 2)))
+    columns = {
+        "time_s": STEP_S * np.arange(len(motor)), "motor_position_rad": motor, "joint_torque_Nm": load, JOINT: fresh,
+    }  # fmt: skip
+    e = gathered(raw, columns)
+    joint = parse_joint(raw, "nested")
+    p = Problem(joint, of_drive(joint), (e,), Weighing({JOINT: NOISE_RAD}, {}))
+    moved = [np.mean((played(h.path) - fresh)[e.rows]) for h in histories(p, e)]
+    assert min(moved) < -NOISE_RAD < NOISE_RAD < max(moved)
+    fit = Fit(p, p.start, np.empty(0), np.empty((0, 0)))
+    assert zero_by_history(fit) == pytest.approx(np.sqrt(np.mean(np.square(moved))), rel=0.03)
 
 
 def test_a_decomposition_that_ends_without_an_answer_is_made_the_slower_way(

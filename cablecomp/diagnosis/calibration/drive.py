@@ -17,7 +17,7 @@ from cablecomp.errors import InputError, SlackError
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence, load_channel
 from cablecomp.estimation.history import Forgotten, forgotten, full_swing, with_own_carryover
 from cablecomp.estimation.least_squares import Fit, refit, rms_left, solve, weighed
-from cablecomp.estimation.limits import BY_TAPE, GAIN_OF_TORQUE, ZERO_OF_TORQUE
+from cablecomp.estimation.limits import BY_TAPE, GAIN_OF_TORQUE, ZERO_FAINT, ZERO_OF_TORQUE
 from cablecomp.estimation.multi_start import multi_start
 from cablecomp.estimation.parallel import in_processes
 from cablecomp.estimation.parameter import DECADE, Parameter, of_drive, own_of, vague_drive
@@ -269,7 +269,7 @@ def first_weights(config: JointConfig, evidence: Sequence[Evidence]) -> Weighing
 
 def _floor(evidence: Sequence[Evidence], channels: Sequence[str]) -> Weighing:
     sigma = {c: max(float(np.mean([e.noise_at_rows(c) for e in evidence])), 1e-9) for c in channels}
-    return Weighing(sigma, {c: 0.1 * s for c, s in sigma.items()})
+    return Weighing(sigma, {c: ZERO_FAINT * s for c, s in sigma.items()})
 
 
 def noise_floors(fit: Fit, rng: np.random.Generator) -> tuple[float, float]:
