@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -145,3 +146,9 @@ def without_a_name(d: Diagnosis, verdict: str) -> Diagnosis:
         d, verdict=verdict, named=(), candidates=(), not_excluded=(), next_experiment=None, empirical=(), tested=(),
         remainder={**d.remainder, "structured": verdict == "unexplained", "equation": None}, augmented=d.baseline,
     )  # fmt: skip
+
+
+def text_of(html: str) -> str:
+    """The page without scripts and tags."""
+    html = re.sub(r"<(script|style).*?</\1>", " ", html, flags=re.DOTALL).replace("<wbr>", "")
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", html)).replace("&#x27;", "'")

@@ -15,7 +15,7 @@ from rich.console import Console
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from diagnosis_example import NOISE, example, without_a_name
+from diagnosis_example import NOISE, example, text_of, without_a_name
 
 from cablecomp.config import load_joint
 from cablecomp.diagnosis.result import PROTOCOL, Diagnosis, Law, Traces, Value, report_json, write_diagnosis
@@ -24,7 +24,7 @@ from cablecomp.estimation.belief import still_doubted, suspicions
 from cablecomp.report import diagnosis_figures as figures
 from cablecomp.report.diagnosis_answer import shown_first
 from cablecomp.report.diagnosis_page import diagnosis_page
-from cablecomp.report.diagnosis_tables import between, by_recording, interval
+from cablecomp.report.diagnosis_tables import by_recording
 from cablecomp.report.diagnosis_terminal import diagnosis_summary
 from cablecomp.report.page import number
 from cablecomp.report.replay_figures import Scale
@@ -33,12 +33,6 @@ from cablecomp.report.replay_figures import Scale
 @pytest.fixture(scope="module")
 def found() -> Diagnosis:
     return example(600)  # two recordings with the judged rows that a diagnosis has in all
-
-
-def text_of(html: str) -> str:
-    """The page without scripts and tags."""
-    html = re.sub(r"<(script|style).*?</\1>", " ", html, flags=re.DOTALL).replace("<wbr>", "")
-    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", html)).replace("&#x27;", "'")
 
 
 def test_its_files_are_utf_8_wherever_they_are_written(
@@ -297,14 +291,6 @@ def test_repeats_are_said_where_they_limit_what_a_model_can_do(found: Diagnosis)
         assert "the machine itself repeats to" not in terminal(apart)
 
 
-def test_a_zero_changes_by_no_share_and_a_number_without_a_unit_has_none(found: Diagnosis) -> None:
-    moved = (*found.calibration, Value("joint_position_offset_rad", -4e-6, 7e-7, -7e-7))
-    number = {"effect": "strand_break", "parameter": "fraction", "below": 0.25, "unit": "-", "why": ""}
-    text = text_of(diagnosis_page(replace(found, calibration=moved, could_be_unseen=(number,))))
-    assert re.search(r"joint_position_offset_rad −7·10⁻⁷ −4·10⁻⁶ ± 7·10⁻⁷ –", text)
-    assert re.search(r"fraction 0\.25(?! -)", text)
-
-
 def test_a_joint_without_load_is_drawn_over_its_motor(found: Diagnosis) -> None:
     trace = found.traces[0]
     free = replace(trace, covariates={**trace.covariates, "load": np.zeros(len(trace.measured_rad))})
@@ -339,31 +325,3 @@ def test_a_sessions_own_value_is_said_to_differ_between_sessions_whatever_their_
     first_screen = text[: text.index("RMS error of the joint angle, before → after")]
     assert "mu_output differs between sessions run~1 0.1, run~2 0.2" in first_screen
     assert "per unit of" not in text
-
-
-def test_a_profile_interval_stands_in_place_of_two_standard_deviations(found: Diagnosis) -> None:
-    (named,) = found.named
-    (name, value) = next((k, v) for k, v in named.parameters.items() if isinstance(v, Value))
-    other = replace(value, interval_95=(0.125 * value.value, 8.0 * value.value))
-    d = replace(found, named=(replace(named, parameters={**named.parameters, name: other}),))
-    assert between(0.125 * value.value, 8.0 * value.value) in text_of(diagnosis_page(d))
-    plain = replace(found, named=(replace(named, parameters={name: replace(value, interval_95=None)}),))
-    assert between(0.125 * value.value, 8.0 * value.value) not in text_of(diagnosis_page(plain))
-
-
-def test_what_was_chosen_has_no_interval(found: Diagnosis) -> None:
-    (named,) = found.named
-    steps = {
-        "slip_m@mon": Value("slip_m@mon", 1e-4, 1e-6),
-        "second_after_s": Value("second_after_s", 12.5, 0.0),
-    }
-    d = replace(found, named=(replace(named, effect="clamp_slip", parameters=steps),))
-    text = text_of(diagnosis_page(d))
-    assert text.count("chosen, not fitted") == 1
-    assert between(12.5, 12.5) not in text
-    assert re.search(r"slip_m@mon \S+ ± \S+ m ", text)  # in its unit, though a session's own
-
-
-def test_an_interval_stays_inside_what_the_value_can_be() -> None:
-    assert interval(0.5, 1.0, 0.0).split(" … ")[0] == "0"
-    assert interval(0.5, 1.0).startswith("−1.46")
