@@ -20,7 +20,7 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence
-from cablecomp.estimation.limits import HOPELESS, STEP
+from cablecomp.estimation.limits import HOPELESS, STEP, ZERO_FAINT
 from cablecomp.estimation.parallel import side_by_side
 from cablecomp.estimation.parameter import Parameter, own_of
 from cablecomp.estimation.simulate import Simulator, simulator
@@ -49,6 +49,11 @@ class Weighing:
     zero_sd: Mapping[str, float]
     moved: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     history: Mapping[str, float] = field(default_factory=dict)
+
+    def with_history(self, moved_rad: float) -> Weighing:
+        """The same where histories that nobody recorded move the zeros of the joint's angle by so much."""
+        zero_sd = {**self.zero_sd, JOINT: max(ZERO_FAINT * self.sigma[JOINT], moved_rad)}
+        return replace(self, zero_sd=zero_sd, history={JOINT: moved_rad})
 
 
 class Aside(NamedTuple):

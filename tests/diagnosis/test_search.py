@@ -22,7 +22,6 @@ from cablecomp.diagnosis.pace import Pace
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import with_effects
 from cablecomp.errors import InputError
-from cablecomp.estimation.history import zero_by_history
 from cablecomp.estimation.least_squares import Fit, covariance, rms_left, solve, weighed
 
 FREE = JOINT.model_copy(update={"tolerance": {"EA_N": 0.1}})
@@ -106,7 +105,7 @@ def test_how_far_zeros_may_move_in_the_last_fit_is_told_by_its_own_drive(
     drive, found = heavy
     keeps = replace(drive, floor=replace(drive.floor, zero_sd={"joint_position_rad": 0.02}))
     fit = search_module._settled(found.final.terms, found.final.fit, keeps, found.groups).fit
-    assert fit.problem.weighing.zero_sd["joint_position_rad"] == pytest.approx(zero_by_history(fit), rel=0.05)
+    assert fit.problem.weighing.zero_sd["joint_position_rad"] < 0.1 * 0.02
     assert rms_left(fit) == pytest.approx(rms_left(found.final.fit), rel=0.05)
 
 

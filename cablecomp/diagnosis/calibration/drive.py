@@ -69,10 +69,8 @@ def calibrate_drive(
     for k in range(PASSES):
         left = rms_left(fit)
         evidence = with_steady_readings(fit.problem, fit.x, evidence)
-        sensors = _floor(evidence, problem.channels)
-        cut, constant = without_history(fit, evidence)
-        zero_sd = {**sensors.zero_sd, JOINT: max(sensors.zero_sd[JOINT], constant)}
-        floor = Weighing(sensors.sigma, zero_sd, history={JOINT: constant})
+        cut, moved_rad = without_history(fit, evidence)
+        floor = _floor(evidence, problem.channels).with_history(moved_rad)
         fit = solve(fit.problem.with_evidence(cut), fit.x, 10)
         fit = refit(fit, weighed(fit, floor), 6)
         if k > 0 and rms_left(fit) > NO_LESS * left:

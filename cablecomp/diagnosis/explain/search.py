@@ -32,11 +32,9 @@ from cablecomp.diagnosis.folds import Groups, make_groups
 from cablecomp.diagnosis.pace import Pace
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import JOINT, Evidence
+from cablecomp.estimation.evidence import Evidence
 from cablecomp.estimation.history import with_own_carryover, zero_by_history
 from cablecomp.estimation.least_squares import Fit, covariance, derivative_of_part, refit, solve, weighed
-from cablecomp.estimation.limits import ZERO_FAINT
-from cablecomp.estimation.problem import Weighing
 
 
 @dataclass(frozen=True)
@@ -133,20 +131,14 @@ def _nominal(fit: Fit) -> Fit:
 def _settled(terms: tuple[Term, ...], fit: Fit, drive: Calibrated, groups: Groups) -> Model:
     """The fit with weights that its own remainder asks for, so that its uncertainties mean something; as it is where
     the drive cannot be followed with these."""
-    floor = drive.floor if fit.problem.fine else _own_floor(fit, drive.floor)
+    # a calibrated drive may keep for ever what the law that it lacks forgets; where every run is dear, as it is
+    floor = drive.floor if fit.problem.fine else drive.floor.with_history(zero_by_history(fit))
     for _ in range(2):
         try:
             fit = refit(fit, weighed(fit, floor), 6)
         except InputError:
             break
     return Model(terms, fit, left_out(fit, groups))
-
-
-def _own_floor(fit: Fit, floor: Weighing) -> Weighing:
-    """The least weights, with what histories do to zeros by this fit's own drive."""
-    constant = zero_by_history(fit)
-    zero_sd = {**floor.zero_sd, JOINT: max(ZERO_FAINT * floor.sigma[JOINT], constant)}
-    return replace(floor, zero_sd=zero_sd, history={JOINT: constant})
 
 
 def _without_idle_growth(model: Model, drive: Calibrated, groups: Groups) -> Model:
