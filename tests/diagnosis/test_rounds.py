@@ -11,7 +11,7 @@ import pytest
 from joints import SMALL, closed
 
 from cablecomp.config import parse_joint
-from cablecomp.diagnosis.explain import rounds
+from cablecomp.diagnosis.explain import model, rounds
 from cablecomp.diagnosis.explain.beginning import _far as far_off
 from cablecomp.diagnosis.explain.dependence import Dependence, gain_is_told, tell_a_gain
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis, Start
@@ -52,6 +52,31 @@ def test_what_trades_places_with_a_drive_that_is_not_known_is_tried_beside_what_
     at.groups = SimpleNamespace(by="block")
     rounds._begun(at, answers)
     assert sorted(tried) == [*plain[: LIMITS.tried_later], *trading[:further]]
+
+
+@pytest.mark.parametrize(("number", "kept"), [(0, ["coat"]), (1, [])])
+def test_what_alone_leaves_what_is_plausible_is_no_answer_and_is_kept_apart(
+    number: int, kept: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beside other effects it is not kept at all."""
+    law = catalogue()["pressure_dependent_friction"]
+    coat, path = (Hypothesis(law, n, law.parameter("exponent"), (), True) for n in ("coat", "path"))
+    for place in (rounds, model):
+        monkeypatch.setattr(place, "runs_away", lambda fit, h: h.name == "coat")
+    monkeypatch.setattr(model, "no_answer", lambda fit, term: "")
+    monkeypatch.setattr(rounds, "no_answer", lambda fit, term: "")
+    monkeypatch.setattr(rounds, "solve", lambda problem, *_: SimpleNamespace(values={}))
+    monkeypatch.setattr(rounds, "left_out", lambda fit, groups: np.zeros(1))
+    monkeypatch.setattr(rounds, "ranked_models", lambda models, groups: models)
+    monkeypatch.setattr(rounds, "_compared", lambda models, at, fine, rng: models)
+    at: Any = SimpleNamespace(
+        number=number, pool=(), groups=None, tell=lambda what: None, pace=SimpleNamespace(over=False),
+        model=SimpleNamespace(terms=()),
+    )  # fmt: skip
+    begun: Any = [SimpleNamespace(terms=(h,), problem=None, x=None, J=None) for h in (coat, path)]
+    tried, away = rounds._tried(begun, at, None, np.random.default_rng(0))
+    assert [m.name for m in tried] == ["path"]  # type: ignore[attr-defined]
+    assert [m.name for m in away] == kept
 
 
 def test_an_effect_that_is_asked_for_by_several_amounts_takes_one_place() -> None:
@@ -151,9 +176,9 @@ def test_an_effect_with_pretensions_of_each_sessions_own_is_tried_beside_what_ha
 ) -> None:
     """Of two in turn that of which more is taken off is accepted; what surely helps alone is."""
 
-    def tried(chosen: list[str], *_: Any) -> list[Any]:
+    def tried(chosen: list[str], *_: Any) -> tuple[list[Any], list[Any]]:
         found = {"alone": ScoreDifference(0.1, z, z), "together": ScoreDifference(0.3, 4.0, 4.0)}
-        return [SimpleNamespace(difference=found[c], term=c, model=c) for c in chosen]
+        return [SimpleNamespace(difference=found[c], term=c, model=c) for c in chosen], []
 
     for name, answer in {
         "_asked": [],

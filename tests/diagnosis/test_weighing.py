@@ -259,6 +259,23 @@ def test_what_is_said_to_go_counts_in_full_what_the_model_misses_by_far() -> Non
     )
 
 
+def test_what_alone_has_to_be_larger_than_is_plausible_takes_off_what_it_does_all_the_same(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """All of a jaw's recordings: its bearing's friction, one of four effects, ends alone just beyond what is plausible,
+    and by last digits just below it."""
+    monkeypatch.setattr(weighing, "_gone", lambda selection, before, after: before - after.left)
+    models = {
+        name: SimpleNamespace(terms=(SimpleNamespace(name=name),), left=left)
+        for name, left in (("path", 3.0), ("jaw", 4.0))
+    }
+    first = SimpleNamespace(tried=[SimpleNamespace(model=models["path"])], away=(models["jaw"],))
+    selection: Any = SimpleNamespace(baseline=10.0, rounds=(first,))
+    assert {n: [*weighing._alone(selection, n)] for n in ("path", "jaw", "motor")} == {
+        "path": [7.0], "jaw": [6.0], "motor": []
+    }  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("alone", "scores", "surest", "by"),
     [

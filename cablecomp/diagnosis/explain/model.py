@@ -81,11 +81,13 @@ class Tried:
 
 @dataclass(frozen=True)
 class Round:
-    """One step: what was fitted, what was taken."""
+    """One step: what was fitted, what was taken; models in which an effect alone left what is plausible of it, which
+    are no answers."""
 
     base: Model
     tried: tuple[Tried, ...]
     accepted: Tried | None
+    away: tuple[Model, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -24,11 +24,12 @@ from cablecomp.diagnosis.explain.model import (
     finely,
     loss,
     lost,
+    no_answer,
     placed,
 )
 from cablecomp.diagnosis.explain.model import ranked as ranked_models
 from cablecomp.diagnosis.explain.pairs import with_own_pretensions
-from cablecomp.diagnosis.explain.plausible import falls_between
+from cablecomp.diagnosis.explain.plausible import falls_between, runs_away
 from cablecomp.diagnosis.explain.scores import (
     block_losses,
     demanded,
@@ -55,13 +56,12 @@ def one_round(at: Beginning, rng: np.random.Generator) -> Round:
         there = [anchor(fine.fit)]
         answers = [(ask_all(there, a[0].hypothesis) or a) if _wants_rates(a[0], at) else a for a in answers]
     begun = _begun(at, answers)
-    tried = _tried(_chosen(*begun, at), at, fine, rng)
+    tried, away = _tried(_chosen(*begun, at), at, fine, rng)
     if not any(t.difference.z > LIMITS.z_sure for t in _good(tried, at)):
-        tried = sorted(
-            [*tried, *_tried(_pairs(begun[0], at), at, fine, rng)], key=lambda t: -t.difference.gain
-        )
+        pairs, _ = _tried(_pairs(begun[0], at), at, fine, rng)
+        tried = sorted([*tried, *pairs], key=lambda t: -t.difference.gain)
     good = _good(tried, at)
-    return Round(at.model, tuple(tried), good[0] if good else None)
+    return Round(at.model, tuple(tried), good[0] if good else None, tuple(away))
 
 
 def _good(tried: Sequence[Tried], at: Beginning) -> list[Tried]:
@@ -71,15 +71,24 @@ def _good(tried: Sequence[Tried], at: Beginning) -> list[Tried]:
 
 def _tried(
     chosen: Sequence[Begun], at: Beginning, fine: Model | None, rng: np.random.Generator
-) -> list[Tried]:
-    """What is chosen fitted to the end and compared with the model; once the time is up the first alone."""
+) -> tuple[list[Tried], list[Model]]:
+    """What is chosen fitted to the end and compared with the model, and what has run away; once the time is up the
+    first alone."""
 
     def finish(c: Begun) -> Model | None:
         at.tell(f"fitting {c.terms[0].name}")
         return None if at.pace.over and c is not chosen[0] else _finished(c, at, fine)
 
-    models = ranked_models([m for m in in_processes(finish, chosen) if m is not None], at.groups)
-    return _compared(models, at, fine, rng)
+    found = [m for m in in_processes(finish, chosen) if m is not None]
+    away = [m for m in found if _away(m, at)]
+    models = ranked_models([m for m in found if not any(m is a for a in away)], at.groups)
+    return _compared(models, at, fine, rng), away
+
+
+def _away(model: Model, at: Beginning) -> bool:
+    """Whether what was added to a model has left what is plausible of it."""
+    added = model.terms[len(at.model.terms)]
+    return isinstance(added, Hypothesis) and runs_away(model.fit, added)
 
 
 def _pairs(begun: Sequence[Begun], at: Beginning) -> list[Begun]:
@@ -197,13 +206,14 @@ def _place(c: Begun) -> str:
 
 
 def _finished(c: Begun, at: Beginning, fine: Model | None) -> Model | None:
-    """The model with what was begun, fitted to the end; None where it cannot be followed, or is none of it."""
+    """The model with what was begun, fitted to the end; None where it cannot be followed, or is none of it, or, beside
+    other effects, has left what is plausible of it."""
     try:
         fit = solve(c.problem, c.x, LIMITS.to_the_end, LIMITS.tolerance, c.J)
     except InputError:
         return None
     terms = tuple(best_resolved(fit, t, at.pool) if isinstance(t, Hypothesis) else t for t in c.terms)
-    if lost(fit, terms[0]):
+    if no_answer(fit, terms[0]) or (at.number > 0 and lost(fit, terms[0])):
         return None
     ratio = 1.0
     if fine is not None and fit.problem.fine:

@@ -190,9 +190,14 @@ def _beaten(selection: Selection, term: Hypothesis, differences: Mapping[str, Sc
 
 
 def _alone(selection: Selection, name: str) -> Iterator[FloatArray]:
-    """As `_gone`, of an effect alone beside the calibrated drive, where it was fitted so."""
-    first = selection.rounds[0].tried if selection.rounds else ()
-    yield from (_gone(selection, selection.baseline, t.model) for t in first if t.term.name == name)
+    """As `_gone`, of an effect alone beside the calibrated drive, where it was fitted so, even if alone it has to be
+    larger than is plausible: beside others it is not."""
+    if not selection.rounds:
+        return
+    first = selection.rounds[0]
+    for model in (*(t.model for t in first.tried), *first.away):
+        if model.terms[0].name == name:
+            yield _gone(selection, selection.baseline, model)
 
 
 def _gone(selection: Selection, before: Model | None, after: Model) -> FloatArray:
