@@ -27,7 +27,7 @@ def joint_text(config: JointConfig, comments: tuple[str, ...] = ()) -> str:
     for effect in config.effect:
         lines += _table("effect", {"id": effect.id, **effect.parameters}, array=True)
     for law in data["empirical"]:
-        lines += _table("empirical", law, array=True)
+        lines += _table("empirical", {k: v for k, v in law.items() if k != "session" or v}, array=True)
     for depends in data["depends"]:
         lines += _table("depends", depends, array=True)
     for session in data["session"]:

@@ -12,7 +12,7 @@ from cablecomp.config.options import EffectEntry, Limits, ObserverOptions, Remai
 from cablecomp.config.schema import JointConfig
 from cablecomp.config.sessions import Depends, Empirical, Session
 from cablecomp.config.toml_file import TomlTable, read_toml
-from cablecomp.config.values import claimed_by, claiming, in_session, session_of, with_values
+from cablecomp.config.values import claimed_by, claiming, in_session, session_of, with_laws_of, with_values
 
 __all__ = [
     "Depends",
@@ -42,5 +42,6 @@ __all__ = [
     "read_toml",
     "session_of",
     "validated",
+    "with_laws_of",
     "with_values",
 ]

@@ -31,7 +31,7 @@ class JointConfig(Frozen):
     )
     sensors: Sensors = Sensors()
     effect: Annotated[tuple[EffectEntry, ...], listed(64)] = ()
-    empirical: Annotated[tuple[Empirical, ...], listed(16)] = ()
+    empirical: Annotated[tuple[Empirical, ...], listed(256)] = ()
     observer: ObserverOptions = ObserverOptions()
     limits: Limits = Limits()
     session: Annotated[tuple[Session, ...], Listed, BeforeValidator(as_tables)] = ()
@@ -99,6 +99,13 @@ class JointConfig(Frozen):
                 )
         for session in self.session:
             self._values_of(session, held)
+        mountings = {*names, *(s.mounting for s in self.session), ""}
+        for law in self.empirical:
+            if law.session not in mountings:
+                known = ", ".join(s.name for s in self.sessions) or "none"
+                raise ValueError(
+                    f"[[empirical]] `{law.id}`: no [[session]] is called `{law.session}`; there are: {known}"
+                )
         return self
 
     def _values_of(self, session: Session, held: Mapping[str, object]) -> None:

@@ -78,7 +78,8 @@ class Empirical(Frozen):
 
     `id` says what it is; `law` its form; `of` the channel that it depends on. With x = (of - centre)/half_width,
     the argument in -1..1, the law gives sum of coefficients_rad[k] times the form's k-th function of x.
-    `centre` and `half_width` are in the unit of `of`.
+    `centre` and `half_width` are in the unit of `of`. With a `session` it holds in that one, or that
+    mounting, alone.
     """
 
     id: Text
@@ -87,6 +88,7 @@ class Empirical(Frozen):
     centre: Finite = 0.0
     half_width: Positive = 1.0
     coefficients_rad: Annotated[tuple[Finite, ...], Listed] = Field(min_length=1)
+    session: str = ""
 
 
 def as_tables(value: Any) -> Any:

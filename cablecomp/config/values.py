@@ -7,7 +7,7 @@ ID.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -126,5 +126,17 @@ def session_of(config: JointConfig, recording: Path | None, name: str | None) ->
 
 
 def in_session(config: JointConfig, session: Session | None) -> JointConfig:
-    """The configuration with the session's own values in place; as it is without a session."""
-    return config if session is None else with_values(config, session.values)
+    """The configuration with the session's own values and laws in place; as it is without a session."""
+    if session is None:
+        return config
+    return with_laws_of(with_values(config, session.values), (session.name, session.mounting))
+
+
+def with_laws_of(config: JointConfig, sessions: Collection[str]) -> JointConfig:
+    """The configuration with those laws without a name in force that hold in these sessions alone; those of other
+    sessions are left out."""
+    if not any(law.session for law in config.empirical):
+        return config
+    here = (law for law in config.empirical if not law.session or law.session in sessions)
+    laws = tuple(law.model_copy(update={"session": ""}) for law in here)
+    return config.model_copy(update={"empirical": laws})

@@ -19,7 +19,7 @@ from cablecomp.estimation.departures import FEWEST
 from cablecomp.estimation.evidence import JOINT, MOTOR, OUTPUTS, Evidence, load_channel
 from cablecomp.estimation.gather import gather, rows_for
 from cablecomp.estimation.parallel import in_processes
-from cablecomp.estimation.standing import ONE_CLAIM, apart_of, stated_of
+from cablecomp.estimation.standing import ONE_CLAIM, apart_of, claimed_as, stated_of
 from cablecomp.signal.smoothing import FloatArray
 
 Sessions = Literal["folder", "each", "one"]
@@ -126,9 +126,8 @@ def gather_body(
         after = end
         stated = stated_of(config, Path(e.name), recordings[e.name])
         motor_is_load = load_channel(config, e.columns) == MOTOR
-        found.append(
-            replace(e, apart=apart_of(config, stated, shift_s=e.shift_s, motor_is_load=motor_is_load))
-        )
+        apart = apart_of(config, stated, shift_s=e.shift_s, motor_is_load=motor_is_load)
+        found.append(replace(e, apart=apart, claimed=claimed_as(config, Path(e.name))))
     return Body(tuple(e.name for e in found), *kept_for_the_end(found))
 
 

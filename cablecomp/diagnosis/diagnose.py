@@ -155,7 +155,7 @@ def _judged(
     pace.tell("counting errors on data left out", 0.95)
     laws = empirical_laws(kept, found.groups) if named or structured else []
     if kept is not final or laws:
-        again = [f.law for f in laws]
+        again = [law for f in laws for law in f.laws]
         augmented = errors_of(kept.fit, case.body.final, by, again) if kept.terms or laws else baseline
     structured = structured or any(not_carried(augmented, drive.floor_rad))
     verdict = verdict_of(bool(named), structured, drive, kept)

@@ -104,4 +104,4 @@ class Outcome:
     @property
     def empirical(self) -> list[Empirical]:
         """The laws without a name, as a configuration has them."""
-        return [f.law for f in self.laws]
+        return [law for f in self.laws for law in f.laws]

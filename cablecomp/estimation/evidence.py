@@ -53,7 +53,8 @@ class Evidence:
     before each, in which the drive went where it was not seen to; `apart`: by parameter, in this order, how the
     configuration states that the joint stood apart in this recording; `steady`: by output channel, its readings on the
     judged rows with noise averaged off (`steadying.py`), and `quiet`: what part of a fine row's noise (variance) is
-    left in these.
+    left in these; `claimed`: the configuration's session that claims the recording and its mounting, where
+    laws without a name hold in one session alone.
     """
 
     name: str
@@ -75,6 +76,7 @@ class Evidence:
     read: Mapping[str, BoolArray] = field(default_factory=dict)
     steady: Mapping[str, FloatArray] = field(default_factory=dict)
     quiet: Mapping[str, float] = field(default_factory=dict)
+    claimed: tuple[str, ...] = ()
 
     def at_rows(self, name: str) -> FloatArray:
         """A channel on the judged rows."""

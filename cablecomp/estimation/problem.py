@@ -170,6 +170,7 @@ class Problem:
         """The same for recordings in which the joint stands alike, wherever x is."""
         return (
             r.session if any(p.session for p in self.parameters) else None,
+            r.claimed,
             *r.apart.items(),
             *(r.condition[p.condition] for p in self.parameters if p.condition),
         )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cablecomp.config import JointConfig, claimed_by, in_session, session_of, with_values
+from cablecomp.config import JointConfig, claimed_by, in_session, session_of, with_laws_of, with_values
 from cablecomp.effects import catalogue
 from cablecomp.errors import InputError
 from cablecomp.estimation.evidence import Apart, Evidence
@@ -62,7 +62,7 @@ def in_its_place(joint: JointConfig, recording: Evidence) -> JointConfig:
     """A joint of common values as it stands in a recording by what its configuration states of that one."""
     for name, apart in recording.apart.items():
         joint = with_values(joint, {name: apart.factor * value_of(joint, name) + apart.addend})
-    return joint
+    return with_laws_of(joint, recording.claimed)
 
 
 def stated_of(config: JointConfig, recording: Path, columns: Mapping[str, FloatArray]) -> dict[str, float]:
@@ -70,6 +70,14 @@ def stated_of(config: JointConfig, recording: Path, columns: Mapping[str, FloatA
     its conditions make."""
     claimed = claimed_by(config, recording, ONE_CLAIM)
     return dict(claimed.values) if claimed else _gained(config, columns)[0]
+
+
+def claimed_as(config: JointConfig, recording: Path) -> tuple[str, ...]:
+    """The names of the configuration's session that claims a recording and of its mounting, where laws hold in one
+    session alone; else none."""
+    by_session = any(law.session for law in config.empirical)
+    claimed = claimed_by(config, recording, ONE_CLAIM) if by_session else None
+    return () if claimed is None else (claimed.name, claimed.mounting)
 
 
 def apart_of(

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 from cablecomp.cluster import Workers
-from cablecomp.config import JointConfig
+from cablecomp.config import JointConfig, with_laws_of
 from cablecomp.config.sessions import Session
 from cablecomp.config_text import write_joint
 from cablecomp.diagnosis.body import session_names
 from cablecomp.errors import InputError
-from cablecomp.estimation.standing import stated_of
+from cablecomp.estimation.standing import claimed_as, stated_of
 from cablecomp.signal.smoothing import FloatArray
 from cablecomp.trials.curves import Concealed, Curves, curves, score_concealed
 from cablecomp.trials.run import (
@@ -153,7 +153,8 @@ def joint_of_piece(joint: JointConfig, drawn: Mapping[str, Columns]) -> JointCon
         for k, values in enumerate(stated, start=1):
             name = f"recording-{k}"
             sessions.append(Session(name=name, mounting="piece", recordings=(f"{name}.npz",), values=values))
-    return joint.model_copy(update={"session": tuple(sessions), "depends": ()})
+    claimed = claimed_as(joint, Path(next(iter(drawn))))  # a piece is of one session
+    return with_laws_of(joint, claimed).model_copy(update={"session": tuple(sessions), "depends": ()})
 
 
 def _stretch(rng: np.random.Generator, columns: Columns, seconds: float) -> dict[str, FloatArray]:

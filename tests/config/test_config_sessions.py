@@ -239,6 +239,35 @@ def test_an_empirical_law_adds_its_curve_to_the_joint_position(law: str, of: str
     np.testing.assert_allclose(with_law - plain, curve, atol=1e-15)
 
 
+MONDAYS = SESSIONS + RIPPLE.format(law="fourier", of="motor_position_rad") + "session = 'monday'\n"
+
+
+@pytest.mark.parametrize(
+    ("session", "runs"), [(None, False), ("tuesday", False), ("monday", True), ("late on monday", True)]
+)
+def test_a_law_of_one_session_runs_in_that_one_and_on_that_mounting_alone(
+    session: str | None, runs: bool
+) -> None:
+    part = "[[session]]\nname = 'late on monday'\nmounting = 'monday'\n"
+    joint, plain = config(MONDAYS + part), config(SESSIONS + part)
+    columns = {
+        "time_s": np.arange(50) * 1e-2,
+        "motor_position_rad": np.linspace(-0.2, 0.7, 50),
+        "joint_torque_Nm": np.zeros(50),
+    }
+    angles = []
+    for c in (joint, plain):
+        there = None if session is None else session_of(c, None, session)
+        angles.append(Observer(in_session(c, there)).run(columns)["joint_position_rad"])
+    assert bool(np.any(np.abs(angles[0] - angles[1]) > 1e-4)) is runs
+    assert parse_joint(tomllib.loads(joint_text(joint)), "again") == joint
+
+
+def test_a_law_of_a_session_that_is_not_there_is_refused() -> None:
+    with pytest.raises(InputError, match=r"ripple_by_motor_angle`: no \[\[session\]\] is called `sunday`"):
+        config(MONDAYS.replace("session = 'monday'", "session = 'sunday'"))
+
+
 @pytest.mark.parametrize(("law", "of"), [("spline", "time_s"), ("fourier", "dwell")])
 def test_an_empirical_law_that_cannot_run_is_refused(law: str, of: str) -> None:
     with pytest.raises(InputError, match=r"ripple_by_motor_angle.*accepted"):

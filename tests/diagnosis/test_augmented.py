@@ -13,7 +13,7 @@ import pytest
 from joints import SMALL, SMALL_NOISE, closed
 from small_drive import TOLERANT, course, recorded
 
-from cablecomp.config import JointConfig, parse_joint
+from cablecomp.config import Empirical, JointConfig, parse_joint
 from cablecomp.config.sessions import Session
 from cablecomp.config_text import joint_text
 from cablecomp.diagnosis.answer.augmented import augmented_joint
@@ -131,6 +131,23 @@ def test_sessions_that_the_recordings_do_not_belong_to_stay_as_they_were() -> No
     assert stood["mon"].drive.stage[0].pretension_N == pytest.approx(1.1 * tension_N)
     assert stood["tue"].drive.stage[0].pretension_N == pytest.approx(1.25 * 1.1 * tension_N)
     assert {s.effect[0].parameters["slip_m"] for s in stood.values()} == {0.0}
+
+
+def test_laws_of_sessions_are_written_with_these_and_go_with_them() -> None:
+    """What an earlier diagnosis wrote of a session that is not there any more has nowhere to hold."""
+    laws = [
+        Empirical(
+            id="ripple", law="fourier", of="motor_position_rad", coefficients_rad=(0.0, 1e-3), session=s
+        )
+        for s in ("mon", "tue", "long ago", "")
+    ]
+    known = [Session(name="long ago", recordings=("mon/0",))]
+    joint = TOLERANT.model_copy(update={"session": tuple(known), "empirical": tuple(laws[2:])})
+    body = gather_body(TOLERANT, {name: recorded((), 12.0) for name in ("mon/0", "tue/0")})
+    model = with_a_slip(body.used, 1e3)
+    written = augmented_joint(joint, replace(model, terms=()), laws[:2])
+    assert [law.session for law in written.empirical] == ["", "mon", "tue"]
+    assert parse_joint(tomllib.loads(joint_text(written)), "again") == written
 
 
 def with_a_slip(evidence: Sequence[Evidence], instant_s: float) -> Model:

@@ -13,9 +13,12 @@ from turning import JOINT, recorded
 
 from cablecomp.config import parse_joint
 from cablecomp.diagnosis.body import gather_body, read_by_all, read_by_some, session_names
+from cablecomp.diagnosis.calibration.drive import first_weights
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
-from cablecomp.estimation.standing import stated_of
+from cablecomp.estimation.parameter import of_drive
+from cablecomp.estimation.problem import Problem
+from cablecomp.estimation.standing import standing, stated_of
 from cablecomp.signal.smoothing import FloatArray
 
 PLAIN = JOINT.model_dump(by_alias=True, exclude_none=True)
@@ -79,6 +82,24 @@ def test_a_part_of_a_mounting_goes_before_a_mounting_that_names_all_of_its_recor
     assert set(session_names(joint, names).values()) == {"mine"}
     stated = [stated_of(joint, Path(name), {})["pretension_N"] for name in names]
     assert stated == [30.0, 33.0]
+
+
+def test_a_law_of_one_session_holds_in_its_recordings_when_it_is_diagnosed_again() -> None:
+    motor = "motor_position_rad"
+    law = {"id": "ripple", "law": "fourier", "of": motor, "coefficients_rad": [0.0, 1e-3], "session": "a"}
+    entries = [{"name": n, "recordings": [f"{n}/*"]} for n in "ab"]
+    joint = parse_joint({**PLAIN, "session": entries, "empirical": [law]}, "x")
+    body = gather_body(joint, {"a/1": with_torque(1), "b/1": with_torque(2)})
+    of_a, of_b = (standing(joint, {}, e) for e in body.used)
+    assert [f.id for f in of_a.empirical] == ["ripple"]
+    assert of_a.empirical[0].session == ""
+    assert of_b.empirical == ()
+    problem = Problem(joint, of_drive(joint), body.used, first_weights(joint, body.used))
+    plain = replace(problem, config=parse_joint({**PLAIN, "session": entries}, "x"))
+    with_law, without = (p.misfits(p.start)[ANGLE] for p in (problem, plain))
+    added = 1e-3 * np.sin(np.pi * body.used[0].at_rows(motor))
+    np.testing.assert_allclose(without[0] - with_law[0], added, atol=1e-12)
+    np.testing.assert_array_equal(without[1], with_law[1])
 
 
 @pytest.mark.parametrize("count", [0, 1, 8])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cablecomp.config import Empirical
-from cablecomp.diagnosis.describe.empirical import _curve, _Rows, _wave, refitted, value_of
+from cablecomp.diagnosis.describe.empirical import _curve, _own_curve, _Rows, _wave, refitted, value_of
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.gather import gather
@@ -54,6 +54,51 @@ def test_a_law_by_load_has_to_hold_where_recordings_reach_further(by_level: bool
     groups = Groups(owner, owner, "recording", np.zeros_like(owner))
     rows = _Rows(parts, np.concatenate(left), np.ones(len(owner)), groups)
     assert (_curve("joint_torque_Nm", rows) is not None) is kept
+
+
+@pytest.mark.parametrize(("turned", "own"), [(-1.0, True), (0.0, True), (1.0, False)])
+def test_a_ripple_of_each_sessions_own_is_told_from_one_that_they_share(turned: float, own: bool) -> None:
+    """Six recordings of each of two sessions; in the second one the ripple is turned over, none, the same."""
+    parts, left = [], []
+    for k in range(12):
+        session = "monday" if k < 6 else "tuesday"
+        one = gather(joint(), f"{session}/{k}", recording([], k), session, fine_rows=600, judged_rows=200)
+        angle = one.at_rows("motor_position_rad")[one.counted[JOINT]]
+        noise = 1e-4 * np.random.default_rng(k).standard_normal(len(angle))
+        parts.append(one)
+        left.append((1.0 if k < 6 else turned) * 1e-3 * np.sin(4.0 * angle) + noise)
+    owner = np.repeat(np.arange(len(left)), [len(v) for v in left])
+    groups = Groups(owner, owner, "recording", np.zeros_like(owner))
+    rows = _Rows(parts, np.concatenate(left), np.ones(len(owner)), groups)
+    shared = _curve("motor_position_rad", rows)
+    held = _own_curve(rows if shared is None else replace(rows, left=rows.left - shared.predicted))
+    assert (held is not None) is own
+    assert (shared is not None) is (not own)
+    if held is None:
+        return
+    assert [law.session for law in held.found.laws] == (["monday", "tuesday"] if turned else ["monday"])
+    laws = [*(shared.found.laws if shared else ()), *held.found.laws]
+    here = parts[0]
+    added = sum(value_of(law, here) for law in laws)[here.counted[JOINT]]
+    there = 1e-3 * np.sin(4.0 * here.at_rows("motor_position_rad")[here.counted[JOINT]])
+    assert np.std(added - there) < 0.15 * np.std(there)
+    again = refitted(held.found.laws, parts[:6], left[:6])
+    assert [any(law.coefficients_rad) for law in again] == [law.session == "monday" for law in again]
+
+
+def test_a_session_of_which_nothing_else_tells_has_no_ripple_of_its_own() -> None:
+    """One recording: left out, all of its session is."""
+    parts, left = [], []
+    for k in range(7):
+        session = "monday" if k < 6 else "tuesday"
+        one = gather(joint(), f"{session}/{k}", recording([], k), session, fine_rows=600, judged_rows=200)
+        parts.append(one)
+        left.append(1e-3 * np.sin(4.0 * one.at_rows("motor_position_rad")[one.counted[JOINT]]))
+    owner = np.repeat(np.arange(len(left)), [len(v) for v in left])
+    groups = Groups(owner, owner, "recording", np.zeros_like(owner))
+    held = _own_curve(_Rows(parts, np.concatenate(left), np.ones(len(owner)), groups))
+    assert held is not None
+    assert [law.session for law in held.found.laws] == ["monday"]
 
 
 def scaled(level: float, seed: int) -> dict[str, FloatArray]:

@@ -18,7 +18,7 @@ from rich.text import Text
 
 from cablecomp.cli import main
 from cablecomp.cluster import Workers
-from cablecomp.config.sessions import Session
+from cablecomp.config.sessions import Empirical, Session
 from cablecomp.diagnosis.body import session_names
 from cablecomp.errors import InputError
 from cablecomp.estimation.standing import as_it_stood
@@ -165,6 +165,17 @@ def test_a_pieces_joint_states_what_the_joint_states_of_its_recordings() -> None
     assert len(set(session_names(there, names).values())) == 1
     assert there.session_own == joint.session_own
     assert joint_of_piece(JOINT, drawn) == JOINT
+
+
+def test_a_pieces_joint_has_the_laws_of_its_recordings_session() -> None:
+    laws = tuple(
+        Empirical(id=s, law="fourier", of="motor_position_rad", coefficients_rad=(0.0, 1e-3), session=s)
+        for s in ("one", "two")
+    )
+    sessions = tuple(Session(name=s, recordings=(s,)) for s in ("one", "two"))
+    joint = JOINT.model_copy(update={"session": sessions, "empirical": laws})
+    there = joint_of_piece(joint, {f"two/{k}.csv": recording(JOINT, k) for k in range(2)})
+    assert [(law.id, law.session) for law in there.empirical] == [("two", "")]
 
 
 def _conceal(pieces: Path, wish: OwnWish, out: Path, told: Callable[[int, int], None]) -> str:

@@ -75,8 +75,15 @@ def augmented_joint(
         entries += alone
     entries += [s for s in _others(config, model, common, known) if s.name not in {e.name for e in entries}]
     if not entries:
-        return joint
+        return _with_laws_of(joint, ())
+    joint = _with_laws_of(joint, entries)
     return joint.model_copy(update={"session": (Session(own=tuple(config.session_own)), *entries)})
+
+
+def _with_laws_of(joint: JointConfig, entries: Sequence[Session]) -> JointConfig:
+    """The joint without laws of sessions that it does not know any more."""
+    known = {"", *(s.name for s in entries), *(s.mounting for s in entries)}
+    return joint.model_copy(update={"empirical": tuple(f for f in joint.empirical if f.session in known)})
 
 
 def _stands_apart(fit: Fit, zeros: Mapping[str, FloatArray], e: Evidence) -> bool:

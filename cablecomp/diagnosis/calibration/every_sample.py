@@ -218,6 +218,7 @@ def _all_rows(problem: Problem, thin: Evidence, columns: Columns, group: int) ->
         condition=thin.condition,
         shift_s=thin.shift_s,
         apart=thin.apart,
+        claimed=thin.claimed,
     )
 
 

@@ -1,5 +1,5 @@
-"""Laws without a physical name: what is left of the joint angle as a series in one channel, kept if it holds on
-data left out."""
+"""Laws without a physical name: what is left of the joint angle as a series in one channel, or in that of each session
+by itself, kept if it holds on data left out."""
 
 from __future__ import annotations
 
@@ -24,6 +24,9 @@ drum is."""
 RIDGE = 1e-3
 """Share of the terms' mean energy that holds their coefficients back."""
 CURVES_OVER = ("motor_position_rad", "joint_torque_Nm")
+OWN_CURVE_OVER = "motor_position_rad"
+"""What a curve of each session's own is looked for over: a motor that is mounted anew counts its angle from elsewhere,
+and a cable that is led anew meets other places of its drums and guides."""
 WAVE_OVER = "motor_position_rad"
 """What a wave is looked for over: teeth, poles, an encoder's graduation."""
 FEWEST_WAVES, MOST_PER_TURN = 2.0, 60.0
@@ -36,10 +39,16 @@ SHORTEST = 3.0
 
 @dataclass(frozen=True)
 class Found:
-    """A law that holds, as the configuration has it, and its score against the model without it."""
+    """A law that holds, as the configuration has it, one of each session where it is that one's own, and its score
+    against the model without it."""
 
-    law: Empirical
+    laws: tuple[Empirical, ...]
     difference: ScoreDifference
+
+    @property
+    def law(self) -> Empirical:
+        """The law, of several sessions' the first."""
+        return self.laws[0]
 
 
 def empirical_laws(model: Model, groups: Groups) -> list[Found]:
@@ -47,6 +56,8 @@ def empirical_laws(model: Model, groups: Groups) -> list[Found]:
     rows = _joint_rows(model, groups)
     found: list[Found] = []
     asked: list[Callable[[_Rows], _Held | None]] = [*(partial(_curve, c) for c in CURVES_OVER), _wave]
+    if len(model.fit.problem.sessions) > 1:
+        asked.append(_own_curve)
     while True:
         held = [(h, ask) for ask in asked if (h := ask(rows)) is not None]
         if not held:
@@ -83,25 +94,55 @@ def _joint_rows(model: Model, groups: Groups) -> _Rows:
     return _Rows(problem.evidence, model.left_out[rows].copy(), weight / problem.weighing.sigma[JOINT], here)
 
 
-def _curve(channel: str, rows: _Rows) -> _Held | None:
-    """The series in one channel, fitted to what is left; None where it does not hold on data left out."""
+def _own_curve(rows: _Rows) -> _Held | None:
+    """The series of each session's own."""
+    return _curve(OWN_CURVE_OVER, rows, tuple(dict.fromkeys(e.session for e in rows.evidence)))
+
+
+def _curve(channel: str, rows: _Rows, sessions: Sequence[str] = ("",)) -> _Held | None:
+    """The series in one channel, of each of these `sessions` its own, fitted to what is left; None where it does not
+    hold on data left out."""
     if not all(channel in e.columns for e in rows.evidence):
         return None
     x = np.concatenate([e.at_rows(channel)[e.counted[JOINT]] for e in rows.evidence])
     centre, half = 0.5 * float(x.max() + x.min()), 0.5 * float(np.ptp(x))
     if half <= 0.0:
         return None
-    T = _basis(x, centre, half) * rows.weight[:, None]
+    T = _by_session(_basis(x, centre, half), sessions, rows.evidence) * rows.weight[:, None]
     predicted = _crossed(T, rows.left, rows.groups.fold)
+    helped = [s for s in sessions if not s or _helps(predicted, rows, s)]
+    if len(helped) < len(sessions):
+        return _curve(channel, rows, helped) if helped else None
     step = score_difference(rows.left - predicted, rows.left, rows.groups)
-    if not (_holds(step) and _holds_elsewhere(x, channel, rows)):
+    if not (_holds(step) and _holds_elsewhere(x, channel, rows, sessions)):
         return None
     name = "ripple_by_" + channel.removesuffix("_rad").removesuffix("_Nm").replace("position", "angle")
-    law = Empirical(
-        id=name, law="chebyshev", of=channel, centre=centre, half_width=half,
-        coefficients_rad=(0.0, *(float(c) for c in _ridge(T, rows.left))),
+    laws = tuple(
+        Empirical(
+            id=name + "_per_session" * bool(s), law="chebyshev", of=channel, centre=centre, half_width=half,
+            coefficients_rad=(0.0, *(float(c) for c in own)), session=s,
+        )
+        for s, own in zip(sessions, np.split(_ridge(T, rows.left), len(sessions)), strict=True)
     )  # fmt: skip
-    return _Held(Found(law, step), predicted)
+    return _Held(Found(laws, step), predicted)
+
+
+def _helps(predicted: FloatArray, rows: _Rows, session: str) -> bool:
+    """Whether a law takes anything off on data of a session that were left out: not where all of them were."""
+    own = np.repeat([e.session == session for e in rows.evidence], [_count(e) for e in rows.evidence])
+    here = replace(rows.groups, block=np.where(own, rows.groups.block, -1))
+    return score_difference(rows.left - predicted, rows.left, here).gain > 0.0
+
+
+def _count(e: Evidence) -> int:
+    return int(e.counted[JOINT].sum())
+
+
+def _by_session(T: FloatArray, sessions: Sequence[str], evidence: Sequence[Evidence]) -> FloatArray:
+    """The same columns for each of these sessions, on its own rows; as they are where that is all of them ("")."""
+    counts = [_count(e) for e in evidence]
+    own = [np.repeat([s in ("", e.session) for e in evidence], counts) for s in sessions]
+    return np.hstack([T * rows[:, None] for rows in own])
 
 
 def _wave(rows: _Rows) -> _Held | None:
@@ -126,7 +167,7 @@ def _wave(rows: _Rows) -> _Held | None:
         id="wave_by_motor_angle", law="fourier", of=WAVE_OVER, half_width=np.pi / frequency,
         coefficients_rad=(0.0, *(float(c) for c in _ridge(_waves(x, frequency) * rows.weight[:, None], rows.left))),
     )  # fmt: skip
-    return _Held(Found(law, step), predicted)
+    return _Held(Found((law,), step), predicted)
 
 
 def _best(
@@ -168,11 +209,11 @@ def _holds(step: ScoreDifference) -> bool:
     return step.z > LIMITS.z and step.gain > LIMITS.gain
 
 
-def _holds_elsewhere(x: FloatArray, channel: str, rows: _Rows) -> bool:
+def _holds_elsewhere(x: FloatArray, channel: str, rows: _Rows, sessions: Sequence[str] = ("",)) -> bool:
     """Whether the series helps on recordings that reach about as far in its channel, learnt from those that reach less
     and more, and on those that reach furthest: a curve over the load may be what another law does at these loads, and
     mislead at others."""
-    counts = [int(e.counted[JOINT].sum()) for e in rows.evidence]
+    counts = [_count(e) for e in rows.evidence]
     owner = np.repeat(np.arange(len(counts)), counts)
     away = np.abs(x - np.median(x))
     reach = np.array([np.max(away[owner == k], initial=0.0) for k in range(len(counts))])
@@ -188,14 +229,17 @@ def _holds_elsewhere(x: FloatArray, channel: str, rows: _Rows) -> bool:
         out = of_row == k
         seen = x[~out]
         centre, half = 0.5 * float(seen.max() + seen.min()), 0.5 * float(np.ptp(seen))
-        T = _basis(x, centre, half) * rows.weight[:, None]
+        T = _by_session(_basis(x, centre, half), sessions, rows.evidence) * rows.weight[:, None]
         predicted[out] = T[out] @ _ridge(T[~out], rows.left[~out])
     there = replace(rows.groups, block=np.where(of_row == furthest, rows.groups.block, -1))
     return all(score_difference(rows.left - predicted, rows.left, g).gain > 0.0 for g in (rows.groups, there))
 
 
 def value_of(law: Empirical, recording: Evidence) -> FloatArray:
-    """What a law adds to the joint angle [rad] on a recording's judged rows, as the observer runs it."""
+    """What a law adds to the joint angle [rad] on a recording's judged rows, as the observer runs it: nothing in
+    another session than its own."""
+    if law.session not in ("", recording.session):
+        return np.zeros(len(recording.rows))
     return np.asarray(
         _of(law, recording.at_rows(law.of)) @ np.array(law.coefficients_rad[1:]), dtype=np.float64
     )
@@ -205,7 +249,7 @@ def refitted(
     laws: Sequence[Empirical], recordings: Sequence[Evidence], left: Sequence[FloatArray]
 ) -> list[Empirical]:
     """The same series fitted to other data, a wave's frequency chosen anew: `left`, each recording's misfit [rad] on
-    counted rows, one law after the other."""
+    counted rows, one law after the other; nothing of a session that is not there."""
     weight = np.concatenate([e.weight[e.counted[JOINT]] for e in recordings])
     rest = np.concatenate(left)
     found = []
@@ -216,8 +260,8 @@ def refitted(
             every = [_waves(x, k) * weight[:, None] for k in grid]
             frequency = _best(grid, every, x, weight, rest * weight)
             law = law.model_copy(update={"half_width": np.pi / frequency})
-        T = _of(law, x)
-        c = _ridge(T * weight[:, None], rest * weight)
+        T = _by_session(_of(law, x), [law.session], recordings)
+        c = _ridge(T * weight[:, None], rest * weight) if T.any() else np.zeros(T.shape[1])
         rest = rest - T @ c
         found.append(law.model_copy(update={"coefficients_rad": (0.0, *(float(v) for v in c))}))
     return found
