@@ -59,17 +59,7 @@ def test_a_law_by_load_has_to_hold_where_recordings_reach_further(by_level: bool
 @pytest.mark.parametrize(("turned", "own"), [(-1.0, True), (0.0, True), (1.0, False)])
 def test_a_ripple_of_each_sessions_own_is_told_from_one_that_they_share(turned: float, own: bool) -> None:
     """Six recordings of each of two sessions; in the second one the ripple is turned over, none, the same."""
-    parts, left = [], []
-    for k in range(12):
-        session = "monday" if k < 6 else "tuesday"
-        one = gather(joint(), f"{session}/{k}", recording([], k), session, fine_rows=600, judged_rows=200)
-        angle = one.at_rows("motor_position_rad")[one.counted[JOINT]]
-        noise = 1e-4 * np.random.default_rng(k).standard_normal(len(angle))
-        parts.append(one)
-        left.append((1.0 if k < 6 else turned) * 1e-3 * np.sin(4.0 * angle) + noise)
-    owner = np.repeat(np.arange(len(left)), [len(v) for v in left])
-    groups = Groups(owner, owner, "recording", np.zeros_like(owner))
-    rows = _Rows(parts, np.concatenate(left), np.ones(len(owner)), groups)
+    rows, left = of_two_sessions(turned=turned)
     shared = _curve("motor_position_rad", rows)
     held = _own_curve(rows if shared is None else replace(rows, left=rows.left - shared.predicted))
     assert (held is not None) is own
@@ -78,25 +68,63 @@ def test_a_ripple_of_each_sessions_own_is_told_from_one_that_they_share(turned: 
         return
     assert [law.session for law in held.found.laws] == (["monday", "tuesday"] if turned else ["monday"])
     laws = [*(shared.found.laws if shared else ()), *held.found.laws]
-    here = parts[0]
+    here = rows.evidence[0]
     added = sum(value_of(law, here) for law in laws)[here.counted[JOINT]]
     there = 1e-3 * np.sin(4.0 * here.at_rows("motor_position_rad")[here.counted[JOINT]])
     assert np.std(added - there) < 0.15 * np.std(there)
-    again = refitted(held.found.laws, parts[:6], left[:6])
+    again = refitted(held.found.laws, rows.evidence[:6], left[:6])
     assert [any(law.coefficients_rad) for law in again] == [law.session == "monday" for law in again]
+
+
+@pytest.mark.parametrize("elsewhere_rad", [3.0, 40.0])
+def test_a_motor_that_counts_from_elsewhere_has_a_ripple_of_its_sessions_own(elsewhere_rad: float) -> None:
+    """As fine as where both count alike: a series over both places at once would be the coarser, the further apart."""
+    rows, left = of_two_sessions(turned=-1.0, elsewhere_rad=elsewhere_rad)
+    held = _own_curve(rows)
+    assert held is not None
+    for e, ripple in zip(rows.evidence, left, strict=True):
+        added = sum(value_of(law, e) for law in held.found.laws)[e.counted[JOINT]]
+        assert np.var(added - ripple) - NOISE_RAD**2 < (0.15 * np.std(ripple)) ** 2
+
+
+@pytest.mark.parametrize("turned", [-1.0, 0.0])
+def test_sessions_of_unlike_strokes_have_ripples_of_their_own(turned: float) -> None:
+    """One session says nothing of the other's: how far recordings reach is compared within each."""
+    rows, _ = of_two_sessions(turned=turned, stroke=0.5)
+    held = _own_curve(rows)
+    assert held is not None
+    assert [law.session for law in held.found.laws] == (["monday", "tuesday"] if turned else ["monday"])
+
+
+NOISE_RAD = 1e-4
+
+
+def of_two_sessions(
+    *, turned: float, elsewhere_rad: float = 0.0, stroke: float = 1.0
+) -> tuple[_Rows, list[FloatArray]]:
+    """Six recordings of each of two sessions with a ripple by motor angle, in the second one so many times as large,
+    where the motor counts from elsewhere and goes a part of the way; and what is left of each [rad]."""
+    parts, left = [], []
+    for k in range(12):
+        session = "monday" if k < 6 else "tuesday"
+        one = gather(joint(), f"{session}/{k}", recording([], k), session, fine_rows=600, judged_rows=200)
+        if k >= 6:
+            motor = elsewhere_rad + stroke * one.columns["motor_position_rad"]
+            one = replace(one, columns={**one.columns, "motor_position_rad": motor})
+        angle = one.at_rows("motor_position_rad")[one.counted[JOINT]]
+        noise = NOISE_RAD * np.random.default_rng(k).standard_normal(len(angle))
+        parts.append(one)
+        left.append((1.0 if k < 6 else turned) * 1e-3 * np.sin(4.0 * angle) + noise)
+    owner = np.repeat(np.arange(len(left)), [len(v) for v in left])
+    groups = Groups(owner, owner, "recording", np.zeros_like(owner))
+    return _Rows(parts, np.concatenate(left), np.ones(len(owner)), groups), left
 
 
 def test_a_session_of_which_nothing_else_tells_has_no_ripple_of_its_own() -> None:
     """One recording: left out, all of its session is."""
-    parts, left = [], []
-    for k in range(7):
-        session = "monday" if k < 6 else "tuesday"
-        one = gather(joint(), f"{session}/{k}", recording([], k), session, fine_rows=600, judged_rows=200)
-        parts.append(one)
-        left.append(1e-3 * np.sin(4.0 * one.at_rows("motor_position_rad")[one.counted[JOINT]]))
-    owner = np.repeat(np.arange(len(left)), [len(v) for v in left])
-    groups = Groups(owner, owner, "recording", np.zeros_like(owner))
-    held = _own_curve(_Rows(parts, np.concatenate(left), np.ones(len(owner)), groups))
+    rows, _ = of_two_sessions(turned=1.0)
+    first = rows.at(rows.groups.fold < 7, rows.evidence[:7])
+    held = _own_curve(first)
     assert held is not None
     assert [law.session for law in held.found.laws] == ["monday"]
 

@@ -16,7 +16,7 @@ from cablecomp.diagnosis.explain.scores import ScoreDifference, score_difference
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT, Evidence
-from cablecomp.signal.smoothing import FloatArray, IntArray
+from cablecomp.signal.smoothing import BoolArray, FloatArray, IntArray
 
 TERMS = 10
 """Chebyshev terms after the constant: resolves a tenth of the stroke, as fine as the ripple of a strand on a
@@ -78,6 +78,12 @@ class _Rows:
     weight: FloatArray
     groups: Groups
 
+    def at(self, here: BoolArray, evidence: Sequence[Evidence]) -> _Rows:
+        """The same of some recordings, whose rows these are."""
+        g = self.groups
+        groups = Groups(g.block[here], g.fold[here], g.by, g.channel[here])
+        return _Rows(evidence, self.left[here], self.weight[here], groups)
+
 
 class _Held(NamedTuple):
     found: Found
@@ -95,54 +101,62 @@ def _joint_rows(model: Model, groups: Groups) -> _Rows:
 
 
 def _own_curve(rows: _Rows) -> _Held | None:
-    """The series of each session's own."""
-    return _curve(OWN_CURVE_OVER, rows, tuple(dict.fromkeys(e.session for e in rows.evidence)))
+    """The series of each session's own, about where its motor counts from, of those sessions of which data left out
+    tell one."""
+    laws, predicted = [], np.zeros(len(rows.left))
+    for session in dict.fromkeys(e.session for e in rows.evidence):
+        own = _rows_of(session, rows.evidence)
+        mine = rows.at(own, [e for e in rows.evidence if e.session == session])
+        series = _series(OWN_CURVE_OVER, mine)
+        if series is None:
+            continue
+        law, there = series
+        helps = score_difference(mine.left - there, mine.left, mine.groups).gain > 0.0
+        if helps and _holds_elsewhere(OWN_CURVE_OVER, mine):
+            laws.append(law.model_copy(update={"id": f"{law.id}_per_session", "session": session}))
+            predicted[own] = there
+    step = score_difference(rows.left - predicted, rows.left, rows.groups)
+    return _Held(Found(tuple(laws), step), predicted) if laws and _holds(step) else None
 
 
-def _curve(channel: str, rows: _Rows, sessions: Sequence[str] = ("",)) -> _Held | None:
-    """The series in one channel, of each of these `sessions` its own, fitted to what is left; None where it does not
-    hold on data left out."""
+def _curve(channel: str, rows: _Rows) -> _Held | None:
+    """The series in one channel, fitted to what is left; None where it does not hold on data left out."""
+    series = _series(channel, rows)
+    if series is None:
+        return None
+    law, predicted = series
+    step = score_difference(rows.left - predicted, rows.left, rows.groups)
+    return _Held(Found((law,), step), predicted) if _holds(step) and _holds_elsewhere(channel, rows) else None
+
+
+def _series(channel: str, rows: _Rows) -> tuple[Empirical, FloatArray] | None:
+    """The series in one channel, and what it predicts of rows that were left out; None where it does not move."""
     if not all(channel in e.columns for e in rows.evidence):
         return None
-    x = np.concatenate([e.at_rows(channel)[e.counted[JOINT]] for e in rows.evidence])
+    x = _read(channel, rows.evidence)
+    if not np.ptp(x) > 0.0:
+        return None
     centre, half = 0.5 * float(x.max() + x.min()), 0.5 * float(np.ptp(x))
-    if half <= 0.0:
-        return None
-    T = _by_session(_basis(x, centre, half), sessions, rows.evidence) * rows.weight[:, None]
-    predicted = _crossed(T, rows.left, rows.groups.fold)
-    helped = [s for s in sessions if not s or _helps(predicted, rows, s)]
-    if len(helped) < len(sessions):
-        return _curve(channel, rows, helped) if helped else None
-    step = score_difference(rows.left - predicted, rows.left, rows.groups)
-    if not (_holds(step) and _holds_elsewhere(x, channel, rows, sessions)):
-        return None
+    T = _basis(x, centre, half) * rows.weight[:, None]
     name = "ripple_by_" + channel.removesuffix("_rad").removesuffix("_Nm").replace("position", "angle")
-    laws = tuple(
-        Empirical(
-            id=name + "_per_session" * bool(s), law="chebyshev", of=channel, centre=centre, half_width=half,
-            coefficients_rad=(0.0, *(float(c) for c in own)), session=s,
-        )
-        for s, own in zip(sessions, np.split(_ridge(T, rows.left), len(sessions)), strict=True)
+    law = Empirical(
+        id=name, law="chebyshev", of=channel, centre=centre, half_width=half,
+        coefficients_rad=(0.0, *(float(c) for c in _ridge(T, rows.left))),
     )  # fmt: skip
-    return _Held(Found(laws, step), predicted)
+    return law, _crossed(T, rows.left, rows.groups.fold)
 
 
-def _helps(predicted: FloatArray, rows: _Rows, session: str) -> bool:
-    """Whether a law takes anything off on data of a session that were left out: not where all of them were."""
-    own = np.repeat([e.session == session for e in rows.evidence], [_count(e) for e in rows.evidence])
-    here = replace(rows.groups, block=np.where(own, rows.groups.block, -1))
-    return score_difference(rows.left - predicted, rows.left, here).gain > 0.0
+def _read(channel: str, evidence: Sequence[Evidence]) -> FloatArray:
+    return np.concatenate([e.at_rows(channel)[e.counted[JOINT]] for e in evidence])
 
 
 def _count(e: Evidence) -> int:
     return int(e.counted[JOINT].sum())
 
 
-def _by_session(T: FloatArray, sessions: Sequence[str], evidence: Sequence[Evidence]) -> FloatArray:
-    """The same columns for each of these sessions, on its own rows; as they are where that is all of them ("")."""
-    counts = [_count(e) for e in evidence]
-    own = [np.repeat([s in ("", e.session) for e in evidence], counts) for s in sessions]
-    return np.hstack([T * rows[:, None] for rows in own])
+def _rows_of(session: str, evidence: Sequence[Evidence]) -> BoolArray:
+    """Which rows are a session's; all of them where it has no name."""
+    return np.repeat([session in ("", e.session) for e in evidence], [_count(e) for e in evidence])
 
 
 def _wave(rows: _Rows) -> _Held | None:
@@ -209,10 +223,11 @@ def _holds(step: ScoreDifference) -> bool:
     return step.z > LIMITS.z and step.gain > LIMITS.gain
 
 
-def _holds_elsewhere(x: FloatArray, channel: str, rows: _Rows, sessions: Sequence[str] = ("",)) -> bool:
+def _holds_elsewhere(channel: str, rows: _Rows) -> bool:
     """Whether the series helps on recordings that reach about as far in its channel, learnt from those that reach less
     and more, and on those that reach furthest: a curve over the load may be what another law does at these loads, and
     mislead at others."""
+    x = _read(channel, rows.evidence)
     counts = [_count(e) for e in rows.evidence]
     owner = np.repeat(np.arange(len(counts)), counts)
     away = np.abs(x - np.median(x))
@@ -229,7 +244,7 @@ def _holds_elsewhere(x: FloatArray, channel: str, rows: _Rows, sessions: Sequenc
         out = of_row == k
         seen = x[~out]
         centre, half = 0.5 * float(seen.max() + seen.min()), 0.5 * float(np.ptp(seen))
-        T = _by_session(_basis(x, centre, half), sessions, rows.evidence) * rows.weight[:, None]
+        T = _basis(x, centre, half) * rows.weight[:, None]
         predicted[out] = T[out] @ _ridge(T[~out], rows.left[~out])
     there = replace(rows.groups, block=np.where(of_row == furthest, rows.groups.block, -1))
     return all(score_difference(rows.left - predicted, rows.left, g).gain > 0.0 for g in (rows.groups, there))
@@ -260,8 +275,8 @@ def refitted(
             every = [_waves(x, k) * weight[:, None] for k in grid]
             frequency = _best(grid, every, x, weight, rest * weight)
             law = law.model_copy(update={"half_width": np.pi / frequency})
-        T = _by_session(_of(law, x), [law.session], recordings)
-        c = _ridge(T * weight[:, None], rest * weight) if T.any() else np.zeros(T.shape[1])
+        T = _of(law, x) * _rows_of(law.session, recordings)[:, None]
+        c = _ridge(T * weight[:, None], rest * weight)
         rest = rest - T @ c
         found.append(law.model_copy(update={"coefficients_rad": (0.0, *(float(v) for v in c))}))
     return found
@@ -281,6 +296,8 @@ def _basis(x: FloatArray, centre: float, half: float) -> FloatArray:
 
 
 def _ridge(T: FloatArray, y: FloatArray) -> FloatArray:
+    if not T.any():
+        return np.zeros(T.shape[1])
     scale = RIDGE * float(np.trace(T.T @ T)) / T.shape[1]
     return np.asarray(np.linalg.solve(T.T @ T + scale * np.eye(T.shape[1]), T.T @ y), dtype=np.float64)
 
