@@ -73,11 +73,11 @@ def stated_of(config: JointConfig, recording: Path, columns: Mapping[str, FloatA
 
 
 def claimed_as(config: JointConfig, recording: Path) -> tuple[str, ...]:
-    """The names of the configuration's session that claims a recording and of its mounting, where laws hold in one
-    session alone; else none."""
+    """The names of the configuration's session that claims a recording and of its mounting, if any, where laws hold in
+    one session alone; else none."""
     by_session = any(law.session for law in config.empirical)
     claimed = claimed_by(config, recording, ONE_CLAIM) if by_session else None
-    return () if claimed is None else (claimed.name, claimed.mounting)
+    return () if claimed is None else tuple(name for name in (claimed.name, claimed.mounting) if name)
 
 
 def apart_of(

@@ -17,7 +17,7 @@ from cablecomp.config import Empirical, JointConfig, parse_joint
 from cablecomp.config.sessions import Session
 from cablecomp.config_text import joint_text
 from cablecomp.diagnosis.answer.augmented import augmented_joint
-from cablecomp.diagnosis.body import Columns, gather_body
+from cablecomp.diagnosis.body import Columns, Sessions, gather_body
 from cablecomp.diagnosis.calibration.drive import first_weights
 from cablecomp.diagnosis.diagnose import diagnose
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
@@ -147,6 +147,41 @@ def test_laws_of_sessions_are_written_with_these_and_go_with_them() -> None:
     model = with_a_slip(body.used, 1e3)
     written = augmented_joint(joint, replace(model, terms=()), laws[:2])
     assert [law.session for law in written.empirical] == ["", "mon", "tue"]
+    assert parse_joint(tomllib.loads(joint_text(written)), "again") == written
+
+
+@pytest.mark.parametrize(
+    ("again", "mode"),
+    [
+        ("mon", None),
+        ("mon tue", None),
+        ("mon tue", "each"),
+        ("mon tue", "one"),
+        ("wed", None),
+        ("mon", "one"),
+    ],
+)
+def test_a_law_of_one_session_stays_with_its_recordings_in_whatever_sessions_they_are_diagnosed_again(
+    again: str, mode: Sessions | None
+) -> None:
+    """Also with the days alone that were not diagnosed again."""
+    laws = tuple(
+        Empirical(id=s, law="fourier", of="motor_position_rad", coefficients_rad=(0.0, 1e-3), session=s)
+        for s in ("mon", "tue")
+    )
+    days = tuple(Session(name=s, recordings=(s,)) for s in ("mon", "tue"))
+    joint = TOLERANT.model_copy(update={"session": days, "empirical": laws})
+    columns = recorded((), 12.0)
+    body = gather_body(joint, {f"{day}/{k}": columns for day in again.split() for k in range(2)}, mode)
+    problem = Problem(joint, of_drive(joint), body.used, first_weights(joint, body.used))
+    residual = problem.residual(problem.start)
+    fit = Fit(problem, problem.start, residual, np.zeros((len(residual), len(problem.start))))
+    written = augmented_joint(joint, Model((), fit, residual), (), body.whole_for_the_end)
+    for day in ("mon", "tue", "wed"):
+        for k in range(2):
+            stood = as_it_stood(written, Path(f"{day}/{k}"), dict)[0]
+            held = [law.id for law in stood.empirical if not law.session]
+            assert held == ([day] if day in ("mon", "tue") else []), f"{day}/{k}"
     assert parse_joint(tomllib.loads(joint_text(written)), "again") == written
 
 

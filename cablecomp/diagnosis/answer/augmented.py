@@ -3,7 +3,7 @@ controller run it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from glob import escape
 from math import hypot, inf
@@ -50,7 +50,8 @@ def augmented_joint(
         joint = _with_zeros(joint, _zeros_of(zeros, sessions[0]))
     known = [*fit.problem.evidence, *kept]
     paths = paths_apart([e.name for e in known])
-    entries = []
+    entries: list[Session] = []
+    held: dict[str, tuple[str, ...]] = {}
     for label, members in _ways(model):
         recordings = [*members, *(e for e in kept if _alike(e, members[0], model))]
         last = max(recordings, key=lambda e: float(e.columns["time_s"][0]))
@@ -65,25 +66,46 @@ def augmented_joint(
                 values = {**(_zeros_of(zeros, e.name) if moved else own_zeros), **_own(now, common, fit)}
                 name, claims = f"{label} {paths[e.name]}", (escape(paths[e.name]),)
                 alone.append(Session(name=name, mounting=session, recordings=claims, values=values))
-        if len(sessions) > 1 or _tied(model) or after != common:
+        theirs = _own_laws(config, members[0])
+        if len(sessions) > 1 or _tied(model) or after != common or theirs:
             values = {**own_zeros, **_own(after, common, fit)}
             part = "" if label == session else session
-            whole = () if _tied(model) else _folder(session, recordings, known)
+            whole = () if part else _folder(session, recordings, known)
             every = [escape(path) for path in whole or [paths[e.name] for e in recordings]]
             rest = tuple(path for path in every if (path,) not in {s.recordings for s in alone})
             entries.append(Session(name=label, mounting=part, recordings=rest, values=values))
         entries += alone
+        held |= {s.name: (session, *theirs) for s in entries if s.name not in held}
     entries += [s for s in _others(config, model, common, known) if s.name not in {e.name for e in entries}]
+    held |= {s.name: (s.name, s.mounting) for s in entries if s.name not in held}
+    joint = joint.model_copy(update={"empirical": tuple(_of_sessions(joint.empirical, entries, held))})
     if not entries:
-        return _with_laws_of(joint, ())
-    joint = _with_laws_of(joint, entries)
+        return joint
     return joint.model_copy(update={"session": (Session(own=tuple(config.session_own)), *entries)})
 
 
-def _with_laws_of(joint: JointConfig, entries: Sequence[Session]) -> JointConfig:
-    """The joint without laws of sessions that it does not know any more."""
-    known = {"", *(s.name for s in entries), *(s.mounting for s in entries)}
-    return joint.model_copy(update={"empirical": tuple(f for f in joint.empirical if f.session in known)})
+def _own_laws(config: JointConfig, e: Evidence) -> tuple[str, ...]:
+    """The names of the configuration's sessions that a recording belongs to and that have laws of their own."""
+    return tuple(dict.fromkeys(law.session for law in config.empirical if law.session in e.claimed))
+
+
+def _of_sessions(
+    laws: Iterable[Empirical], entries: Sequence[Session], held: Mapping[str, Collection[str]]
+) -> Iterator[Empirical]:
+    """The laws; those of one session under the names that the `entries` in which they `held` have now. A law without
+    one goes."""
+    for law in laws:
+        if not law.session:
+            yield law
+            continue
+        here = [s for s in entries if law.session in held[s.name]]
+        names = {s.name for s in here}
+        now = (
+            law.session if law.session in (s.name, s.mounting) else s.name
+            for s in here
+            if s.mounting not in names
+        )
+        yield from (law.model_copy(update={"session": name}) for name in dict.fromkeys(now))
 
 
 def _stands_apart(fit: Fit, zeros: Mapping[str, FloatArray], e: Evidence) -> bool:
@@ -141,7 +163,8 @@ def _tied(model: Model) -> bool:
 def _alike(e: Evidence, other: Evidence, model: Model) -> bool:
     """Whether the drive stood alike in two recordings, events apart."""
     here = tuple(e.condition.values()) == tuple(other.condition.values())
-    return e.session == other.session and (here or not _tied(model))
+    laws = [_own_laws(model.fit.problem.config, r) for r in (e, other)]
+    return e.session == other.session and (here or not _tied(model)) and laws[0] == laws[1]
 
 
 def _ways(model: Model) -> Iterator[tuple[str, list[Evidence]]]:
@@ -149,10 +172,14 @@ def _ways(model: Model) -> Iterator[tuple[str, list[Evidence]]]:
     evidence = model.fit.problem.evidence
     for session in model.fit.problem.sessions:
         mine = [e for e in evidence if e.session == session]
-        for way in sorted({tuple(e.condition.values()) for e in mine} if _tied(model) else {()}):
-            members = [e for e in mine if not _tied(model) or tuple(e.condition.values()) == way]
-            named = zip(members[0].condition, way, strict=False)
-            yield session + "".join(f" {k} {v:.4g}" for k, v in named), members
+        laws = {e.name: _own_laws(model.fit.problem.config, e) for e in mine}
+        apart = len(set(laws.values())) > 1
+        stood = {e.name: (tuple(e.condition.values()) if _tied(model) else (), laws[e.name]) for e in mine}
+        for way in sorted(set(stood.values())):
+            members = [e for e in mine if stood[e.name] == way]
+            named = zip(members[0].condition, way[0], strict=False)
+            words = [f" {k} {v:.4g}" for k, v in named] + [f" {law}" for law in way[1] if apart]
+            yield session + "".join(words), members
 
 
 def _meanwhile(joint: JointConfig, model: Model, e: Evidence) -> JointConfig:
