@@ -47,7 +47,8 @@ class Equivalent(NamedTuple):
 def beyond_loops(config: JointConfig) -> tuple[str, ...]:
     """What a joint's own effects, empirical laws, sensors, sessions and conditions do that is in no loop of the load
     with the motor held, one line each."""
-    entries: tuple[EffectEntry | Empirical, ...] = (*config.effect, *config.empirical)
+    common = (law for law in config.empirical if not law.session)
+    entries: tuple[EffectEntry | Empirical, ...] = (*config.effect, *common)
     of_time = [entry.id for entry in entries if is_of_time(entry)]
     of_more = [entry.id for entry in entries if _is_of_more(entry) and not is_of_time(entry)]
     right = Sensors()
@@ -57,6 +58,7 @@ def beyond_loops(config: JointConfig) -> tuple[str, ...]:
         if getattr(config.sensors, name) != getattr(right, name)
     ]
     own = dict.fromkeys(name for session in config.sessions for name in session.values)
+    own |= dict.fromkeys(law.id for law in config.empirical if law.session)
     lines = {
         "what goes by the time": of_time,
         "what goes by more than the load enters by its loops alone, motor held at 0 rad": of_more,

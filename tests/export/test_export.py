@@ -263,6 +263,13 @@ values = {{ pretension_N = 50.0, joint_position_offset_rad = 1e-3 }}
 name = "rig-2"
 values = {{ pretension_N = 60.0 }}
 
+[[empirical]]
+id = "ripple"
+law = "fourier"
+of = "motor_position_rad"
+coefficients_rad = [0.0, 1e-3]
+session = "rig-1"
+
 [[depends]]
 parameter = "mu_output"
 on = "bend"
@@ -275,7 +282,8 @@ seen = [0.0, 180.0]
     joint = load_joint(path)
     for lines in (SPRING.lost(joint), left_out(joint)):
         own = next(line for line in lines if "session's own" in line)
-        assert own.endswith(": pretension_N, joint_position_offset_rad")
+        assert own.endswith(": pretension_N, joint_position_offset_rad, ripple")
+        assert sum("ripple" in line for line in lines) == 1  # it does not run at common values
         assert any("with a condition" in line and line.endswith(": mu_output by bend") for line in lines)
     assert not any("session" in line or "condition" in line for line in left_out(JOINT))
 
