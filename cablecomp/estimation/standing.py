@@ -123,6 +123,7 @@ def as_it_stood(
     found = session_of(config, recording, session)
     if found is not None:
         return in_session(config, found), found.name, ()
+    config = with_laws_of(config, ())
     if not config.depends:
         return config, None, ()
     gained, said = _gained(config, head())

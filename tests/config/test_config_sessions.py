@@ -10,8 +10,11 @@ import pytest
 
 from cablecomp.config import in_session, load_joint, parse_joint, session_of
 from cablecomp.config_text import joint_text
+from cablecomp.effects.catalogue import other_channels
 from cablecomp.errors import InputError
+from cablecomp.estimation.standing import as_it_stood
 from cablecomp.observer import Observer
+from cablecomp.recording.assumptions import assumptions
 
 JOINT = Path(__file__).parents[2] / "configs/joints/tendon-finger.toml"
 SESSIONS = """
@@ -261,6 +264,18 @@ def test_a_law_of_one_session_runs_in_that_one_and_on_that_mounting_alone(
         angles.append(Observer(in_session(c, there)).run(columns)["joint_position_rad"])
     assert bool(np.any(np.abs(angles[0] - angles[1]) > 1e-4)) is runs
     assert parse_joint(tomllib.loads(joint_text(joint)), "again") == joint
+
+
+def test_a_recording_of_no_session_asks_for_nothing_that_laws_of_sessions_read() -> None:
+    """Nor are they among what its prediction takes for granted."""
+    joint = config(MONDAYS.replace("motor_position_rad", "other_bend_rad"))
+    for recording, laws, channels in (
+        ("wednesday/1.csv", 0, []),
+        ("monday/1.csv", 1, ["other_bend_rad"]),
+    ):
+        stood, _, _ = as_it_stood(joint, Path(recording), dict)
+        assert other_channels(stood) == channels
+        assert sum("ripple_by_motor_angle" in line for line in assumptions(stood)) == laws
 
 
 def test_a_law_of_a_session_that_is_not_there_is_refused() -> None:
