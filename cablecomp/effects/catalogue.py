@@ -132,9 +132,10 @@ def _is_bounded(effect: Effect, entry: EffectEntry, config: JointConfig) -> bool
 
 def _empirical(config: JointConfig) -> list[Term]:
     """The terms of the laws without a name; none of those that hold in one session alone, where the joint stands in
-    none (`in_session`)."""
+    none (`in_session`): these have to be such as can run all the same."""
     others = other_channels(config)
-    return [t for law in config.empirical if not law.session for t in empirical_term(law, config, others)]
+    terms = [(law, empirical_term(law, config, others)) for law in config.empirical]
+    return [t for law, its in terms if not law.session for t in its]
 
 
 def _change(effect: Effect, values: Mapping[str, float], config: JointConfig) -> Change:

@@ -10,7 +10,7 @@ import pytest
 
 from cablecomp.config import in_session, load_joint, parse_joint, session_of
 from cablecomp.config_text import joint_text
-from cablecomp.effects.catalogue import other_channels
+from cablecomp.effects.catalogue import extend, other_channels
 from cablecomp.errors import InputError
 from cablecomp.estimation.standing import as_it_stood
 from cablecomp.observer import Observer
@@ -276,6 +276,13 @@ def test_a_recording_of_no_session_asks_for_nothing_that_laws_of_sessions_read()
         stood, _, _ = as_it_stood(joint, Path(recording), dict)
         assert other_channels(stood) == channels
         assert sum("ripple_by_motor_angle" in line for line in assumptions(stood)) == laws
+
+
+@pytest.mark.parametrize(("law", "of"), [("spline", "time_s"), ("fourier", "dwell")])
+def test_a_law_of_one_session_that_cannot_run_is_refused_before_that_session_runs(law: str, of: str) -> None:
+    joint = config(SESSIONS + RIPPLE.format(law=law, of=of) + "session = 'monday'\n")
+    with pytest.raises(InputError, match=r"ripple_by_motor_angle.*accepted"):
+        extend(joint)
 
 
 def test_a_law_of_a_session_that_is_not_there_is_refused() -> None:
