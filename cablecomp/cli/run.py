@@ -30,7 +30,7 @@ from cablecomp.cli.shared import (
     errors,
     read_joint,
 )
-from cablecomp.config import JointConfig
+from cablecomp.config import JointConfig, in_session, session_of
 from cablecomp.config_text import joint_text
 from cablecomp.control.options import ControlConfig, ControlMode
 from cablecomp.control.protocol import Protocol, load_protocol
@@ -88,6 +88,10 @@ View = Annotated[
 PlotJuggler = Annotated[
     bool, typer.Option("--plotjuggler", help="frames to PlotJuggler's UDP server, as JSON")
 ]
+InSession = Annotated[
+    str | None,
+    typer.Option("--session", help="[[session]] in which the joint stands: its own values and laws hold"),
+]
 WithoutTimeout = Annotated[
     bool,
     typer.Option(
@@ -116,6 +120,7 @@ def run(
     live: Live = False,
     view: View = False,
     plotjuggler: PlotJuggler = False,
+    session: InSession = None,
     effects: EffectsOption = None,
     as_json: JsonOption = False,
     without_drive_timeout: WithoutTimeout = False,
@@ -131,6 +136,8 @@ def run(
         }  # fmt: skip
         _goes_with_compare([name for name, given in others.items() if given], duration)
     joint = read_joint(config, effects)
+    if session is not None:
+        joint = in_session(joint, session_of(joint, None, session))
     bus, wanted = _bus_and_control(link, control, joint, mode, sim=sim)
     if comparison:
         from cablecomp.cli.demo import compare_controllers  # brings the plant
