@@ -140,7 +140,9 @@ def _angles(view: View) -> list[Suspicion]:
         found.append(Suspicion("sign", JOINT, words, {"slope_over_ratio": factor}))
     off = abs(factor)
     loose = _loose(view.config, "radius")
-    if off > MAGNITUDES_OFF if loose else abs(log(off)) > RATIO_OFF:
+    # a spring's load follows the motor: a slope then holds what the drive yields, and explains less
+    better = view.left(ratio=view.slope) < view.left()
+    if better and (off > MAGNITUDES_OFF if loose else abs(log(off)) > RATIO_OFF):
         nearest = min(_ANGLES, key=lambda f: abs(log(off / f)))
         unit = _ANGLES[nearest] if loose or abs(log(off / nearest)) < 0.1 else None
         words = unit or "a gear between encoder and pulley, or a radius that is off"

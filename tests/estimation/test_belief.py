@@ -104,6 +104,21 @@ def test_a_ratio_that_is_off_is_held_against_the_one_seen_with_the_load_on_both_
     assert seen < 1e-6 * as_it_is
 
 
+def test_a_ratio_that_explains_less_than_the_drives_own_is_not_said_to_be_off() -> None:
+    """A spring returns the joint, so that load and motor go together; friction at the load's sensor tells its share
+    from the motor's, and the slope is half of the ratio where the spring takes half of the motion."""
+    motor, friction = np.sin(0.3 * TIME), 0.02 * np.sin(0.7 * TIME)
+    softness = 1.0 / stiffness_range(JOINT).secant_Nm_per_rad
+    spring = -0.5 * JOINT.drive.ratio / softness * motor
+    columns = {
+        "time_s": TIME,
+        "motor_position_rad": motor,
+        "joint_position_rad": JOINT.drive.ratio * motor + softness * spring,
+        "joint_torque_Nm": spring + friction,
+    }
+    assert not [s for s in suspicions(JOINT, columns) if s.kind in ("ratio", "unit")]
+
+
 def test_both_angles_in_degrees() -> None:
     both = {n: np.degrees(COLUMNS[n]) for n in ("joint_position_rad", "motor_position_rad")}
     assert kinds(**both) == [("unit", "joint_position_rad")]
