@@ -89,8 +89,7 @@ PlotJuggler = Annotated[
     bool, typer.Option("--plotjuggler", help="frames to PlotJuggler's UDP server, as JSON")
 ]
 InSession = Annotated[
-    str | None,
-    typer.Option("--session", help="[[session]] in which the joint stands: its own values and laws hold"),
+    str | None, typer.Option("--session", help="[[session]] whose own values and laws hold")
 ]
 WithoutTimeout = Annotated[
     bool,
@@ -136,8 +135,7 @@ def run(
         }  # fmt: skip
         _goes_with_compare([name for name, given in others.items() if given], duration)
     joint = read_joint(config, effects)
-    if session is not None:
-        joint = in_session(joint, session_of(joint, None, session))
+    joint = in_session(joint, session_of(joint, None, session))
     bus, wanted = _bus_and_control(link, control, joint, mode, sim=sim)
     if comparison:
         from cablecomp.cli.demo import compare_controllers  # brings the plant

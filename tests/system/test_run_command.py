@@ -49,6 +49,22 @@ def test_the_command_line_executes_a_protocol(tmp_path: Path) -> None:
     assert asked == pytest.approx(REACH.reference(0.3).joint_position_rad, abs=1e-3)
 
 
+def test_the_loop_runs_in_a_session_with_its_own_laws(tmp_path: Path) -> None:
+    law = (
+        '\n[[session]]\nname = "mon"\n[[empirical]]\nid = "ripple_by_motor_angle_per_session"\nlaw = "fourier"\n'
+        'of = "motor_position_rad"\ncoefficients_rad = [0.005]\nsession = "mon"\n'
+    )
+    joint = tmp_path / "joint.toml"
+    joint.write_text(JOINT.read_text(encoding="utf-8") + law, encoding="utf-8")
+    at_once = []
+    for name, asked in (("plain", []), ("mon", ["--session", "mon"])):
+        out = tmp_path / name
+        assert cli.main([*simulated(joint, out=out, duration=0.3), "--nominal", *asked]) == 0
+        ahead = pl.read_csv(out / "prediction.csv", infer_schema_length=None)
+        at_once.append(ahead["joint_position_rad"].to_numpy()[0])
+    assert at_once[1] - at_once[0] == pytest.approx(0.005, abs=1e-4)
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device stands for a full disk here")
 def test_a_file_for_onlookers_that_the_disk_refuses_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
@@ -73,6 +89,7 @@ def test_a_file_for_onlookers_that_the_disk_refuses_is_told(
         (["run", "--config", "nowhere.toml", "--sim"], "nowhere.toml"),
         (["run", "--config", str(JOINT)], "--link is missing"),
         (["run", "--config", str(JOINT), "--sim", "--mode", "sideways"], "sideways"),
+        (["run", "--config", str(JOINT), "--sim", "--session", "mon"], "has no session of that name"),
         (["run", "--config", str(JOINT), "--sim", "--protocol", str(JOINT)], "segment"),
         (["run", "--config", str(JOINT), "--link", str(JOINT)], "bus"),
         (["run", "--config", str(JOINT), "--control", str(JOINT), "--sim"], "name"),
