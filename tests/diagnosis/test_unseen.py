@@ -15,7 +15,8 @@ from cablecomp.diagnosis.body import gather_body
 from cablecomp.diagnosis.calibration.drive import calibrate_drive
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
 from cablecomp.diagnosis.explain.linear import anchor, contribution
-from cablecomp.diagnosis.explain.unseen import _bound_of_phase, _likeliest, could_be_unseen
+from cablecomp.diagnosis.explain.screening import with_entry
+from cablecomp.diagnosis.explain.unseen import _bound_of_phase, _hidden, _likeliest, could_be_unseen
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT as ANGLE
 from cablecomp.estimation.gather import gather
@@ -98,6 +99,21 @@ def test_a_joint_with_a_hidden_effect_predicts_what_the_one_without_it_does() ->
     as_it_is = np.concatenate(fit.problem.left(fit.x))
     alone, beside = (float(np.std(left(j) - as_it_is)) for j in (bare, mount.joint))
     assert beside < 0.5 * alone
+
+
+def test_what_is_none_of_an_effect_is_not_said_to_hide() -> None:
+    """A guide without friction is free cable: a stiffer one makes up for it, and nothing of friction hides there."""
+    loose = JOINT.model_copy(update={"tolerance": {"EA_N": 0.2, "pretension_N": 0.1, "mu_output": 0.3}})
+    body = gather_body(loose, {"a/1": recorded(seed=1)})
+    fit = calibrate_drive(loose, body.used, np.random.default_rng(0)).fit
+    here = anchor(fit)
+    guide = next(h for h in hypotheses(loose, body.used) if h.name == "routing_friction")
+    entry = guide.entry({**guide.starts[0].values, "mu_angle": 1e-8, "arc_length_m": 0.02})
+    problem = with_entry(fit.problem, guide, entry)
+    there = problem.followed(np.concatenate([fit.x, problem.start[len(fit.x) :]]))
+    assert there is not None
+    hiding = replace(guide, starts=(replace(guide.starts[0], values=entry.parameters),))
+    assert _hidden(here, hiding, 0, fit.residual - there[: len(fit.residual)], 1e-8) is None
 
 
 def test_a_parameter_that_does_nothing_takes_no_step() -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from cablecomp.config import JointConfig
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.linear import Anchor, anchor, contribution
+from cablecomp.diagnosis.explain.model import least
 from cablecomp.diagnosis.explain.screening import with_entry
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.least_squares import Fit
@@ -135,7 +136,7 @@ def _hidden(here: Anchor, h: Hypothesis, shape: int, d: FloatArray, size: float)
     factor = LIMITS.hidden_within / max(most, 1e-300)
     amount = min(abs(size) * factor, max(abs(b) for b in h.amount.bounds(problem.config)))
     visible = length * amount / abs(size)
-    if visible < LIMITS.unseen:
+    if visible < LIMITS.unseen or amount <= least(h.amount, problem.config):
         return None
     does = np.abs(s) * scale
     most_of_it = [problem.parameters[j].name for j in np.argsort(-does) if does[j] > 0.5 * np.max(does)]
