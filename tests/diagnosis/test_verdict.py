@@ -22,6 +22,7 @@ from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.result import Errors
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects import catalogue
+from cablecomp.estimation.evidence import JOINT as ANGLE
 
 NOISE = 2e-5
 
@@ -212,3 +213,19 @@ def test_a_channel_that_is_not_followed_is_said(left: float, said: bool) -> None
     problem = SimpleNamespace(channels=fit.problem.channels, evidence=nowhere)
     assert not list(_not_followed(cast(Any, SimpleNamespace(problem=problem, rms=fit.rms)), False))
     assert all(line.startswith("motor_torque_Nm is not followed") for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("apart_rad", "said"), [(0.5 * NOISE, []), (-40.0 * NOISE, ["s/2: its zero lies -0.8 mrad"])]
+)
+def test_a_zero_that_departs_by_less_than_what_is_left_is_no_clamp_that_slipped(
+    monkeypatch: pytest.MonkeyPatch, apart_rad: float, said: list[str]
+) -> None:
+    """Four recordings alike to a tenth of a count, and one by half of what is left: far off the others, and nothing."""
+    zeros = {ANGLE: {"s": np.zeros(1), "s/1": np.zeros(1), "s/2": np.array([apart_rad])}}
+    evidence = [SimpleNamespace(name=n, session="s") for n in ("s/1", "s/2")]
+    weighing = SimpleNamespace(moved={ANGLE: frozenset({"s/2"})})
+    problem = SimpleNamespace(zeros=lambda x: zeros, evidence=evidence, weighing=weighing)
+    monkeypatch.setattr(verdict, "rms_left", lambda fit: NOISE)
+    lines = [*verdict._set_anew(cast(Any, SimpleNamespace(problem=problem, x=None)))]
+    assert [line.partition(" from")[0] for line in lines] == said

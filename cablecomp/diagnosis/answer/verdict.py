@@ -137,15 +137,18 @@ def _not_followed(fit: Fit, cut_short: bool) -> Iterator[str]:
 
 
 def _set_anew(fit: Fit) -> Iterator[str]:
-    """Recordings with a zero of their own, each with how far it lies from its session's."""
-    zeros = fit.problem.zeros(fit.x)[JOINT]
+    """Recordings with a zero of their own, each with how far it lies from its session's; not by less than what is
+    usually left, which nobody would look for a clamp for."""
+    zeros, usual = fit.problem.zeros(fit.x)[JOINT], rms_left(fit)
     for e in fit.problem.evidence:
-        if e.name in fit.problem.weighing.moved.get(JOINT, ()):
-            apart = 1e3 * float(zeros[e.name][0] - zeros[e.session][0])
+        if e.name not in fit.problem.weighing.moved.get(JOINT, ()):
+            continue
+        apart = float(zeros[e.name][0] - zeros[e.session][0])
+        if abs(apart) > usual:
             yield (
-                f"{short(e.name)}: its zero lies {apart:+.3g} mrad from the others' of its session, and nothing within "
-                "the recordings moves it so: taken as set anew before it (several sessions: `--session each`, or "
-                "[[session]]); if nobody did, a clamp or a drum slipped there"
+                f"{short(e.name)}: its zero lies {1e3 * apart:+.3g} mrad from the others' of its session, and nothing "
+                "within the recordings moves it so: taken as set anew before it (several sessions: `--session each`, "
+                "or [[session]]); if nobody did, a clamp or a drum slipped there"
             )
 
 
