@@ -101,10 +101,8 @@ class Problem:
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Bounds of x."""
-        return (
-            np.array([p.x(p.low) for p in self.parameters]),
-            np.array([p.x(p.high) for p in self.parameters]),
-        )
+        free = self.parameters
+        return np.array([p.x(p.low) for p in free]), np.array([p.x(p.high) for p in free])
 
     def with_evidence(self, evidence: Sequence[Evidence]) -> Problem:
         """The same about other recordings."""
@@ -327,9 +325,8 @@ class Problem:
         for r in self.evidence:
             columns = r.carryover.get(channel) if channel in r.counted else None
             count = 0 if columns is None else columns.shape[1]
-            carryover[r.name] = (
-                np.zeros(len(r.rows)) if columns is None else columns @ solved[first : first + count]
-            )
+            here = solved[first : first + count]
+            carryover[r.name] = np.zeros(len(r.rows)) if columns is None else columns @ here
             first += count
         return Aside(zeros, carryover)
 
@@ -342,14 +339,12 @@ class Problem:
         return np.concatenate(parts) if parts else np.empty(0)
 
     def _length(self) -> int:
-        return sum(int(s.stop - s.start) for s in self.spans().values()) + sum(
-            z.penalty_rows for z in self.bases.values()
-        )
+        rows = sum(int(s.stop - s.start) for s in self.spans().values())
+        return rows + sum(z.penalty_rows for z in self.bases.values())
 
     def _zeros_of(self, channel: str) -> Zeros:
         sigma, spread = self.weighing.sigma[channel], self.weighing.zero_sd.get(channel, 0.0)
         moved = self.weighing.moved.get(channel, {})
-        departs = (
-            [moved.get(r.name, max(spread, 1e-6 * sigma)) for r in self.evidence] if self.departs else []
-        )
+        least = max(spread, 1e-6 * sigma)
+        departs = [moved.get(r.name, least) for r in self.evidence] if self.departs else []
         return zeros_of(self.evidence, self.sessions, channel, sigma, departs)
