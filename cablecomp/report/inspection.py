@@ -43,10 +43,13 @@ def missing_channels(channels: Sequence[str], config: JointConfig | None = None)
     missing = [name for name in needed if name not in channels]
     if not missing:
         return []
-    current = ""
+    made_of = ""
+    torque = next((name for name in missing if name.endswith("torque_Nm")), None)
     if "motor_torque_Nm" in missing and "motor_current_A" in channels:
-        current = " (the current's: --map 'motor_torque_Nm=COLUMN,torque_constant_Nm_per_A=..')"
-    return [f"missing: {', '.join(missing)}; which columns are they?{current}"]
+        made_of = " (the current's: --map 'motor_torque_Nm=COLUMN,torque_constant_Nm_per_A=..')"
+    elif torque is not None:
+        made_of = f" (a force's, at a radius in m: --map '{torque}=COLUMN,scale=RADIUS')"
+    return [f"missing: {', '.join(missing)}; which columns are they?{made_of}"]
 
 
 def show(looked: Looked, console: Console) -> None:

@@ -155,7 +155,11 @@ def test_what_a_converted_recording_lacks_is_said(tmp_path: Path, capsys: pytest
             "missing: motor_torque_Nm; which columns are they? "
             "(the current's: --map 'motor_torque_Nm=COLUMN,torque_constant_Nm_per_A=..')",
         ),
-        ("joint_torque", "missing: joint_torque_Nm; which columns are they?"),
+        (
+            "joint_torque",
+            "missing: joint_torque_Nm; which columns are they? "
+            "(a force's, at a radius in m: --map 'joint_torque_Nm=COLUMN,scale=RADIUS')",
+        ),
         ("both_encoders", ""),
         ("none", ""),
     ],
@@ -178,6 +182,29 @@ def test_missing_is_what_the_joint_takes_its_load_from(
     said = " ".join(capsys.readouterr().err.split())
     assert says in said
     assert says or "missing:" not in said
+
+
+def test_a_load_cells_force_becomes_the_torque_that_is_said_to_be_missing(tmp_path: Path) -> None:
+    """20 mm from the axis, pulling against the angle."""
+    log, to = tmp_path / "a.csv", tmp_path / "b.csv"
+    columns = {n: joint(10)[n] for n in ("time_s", "motor_position_rad", "joint_position_rad")}
+    columns["load_cell_N"] = np.linspace(15.0, 25.0, 10)
+    pl.DataFrame(columns).write_csv(log)
+    assert (
+        main(
+            [
+                "convert",
+                str(log),
+                str(to),
+                "--map",
+                "auto",
+                "--map",
+                "joint_torque_Nm=load_cell_N,scale=-0.02",
+            ]
+        )
+        == 0
+    )
+    np.testing.assert_allclose(pl.read_csv(to)["joint_torque_Nm"], np.linspace(-0.3, -0.5, 10), rtol=1e-12)
 
 
 @pytest.mark.parametrize(
