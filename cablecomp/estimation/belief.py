@@ -81,12 +81,13 @@ def suspicions(config: JointConfig, columns: Mapping[str, FloatArray]) -> tuple[
     odd = tuple(s for s in odd_sensors(view, columns) if not (s.kind == "wrapped" and s.channel in far))
     if any(s.kind in ("stuck", "wrapped") for s in odd):  # it would spoil all that follows
         return (*found, *odd)
-    fits = _angles(view)
+    fits = [f for f in _angles(view) if f.kind != "unit" or _explains_more(view, f)]
     fits += _slack(view)
     if any(f.kind == "unit" or "pretension_bears_Nm" in f.numbers for f in fits):  # and so would these
         return (*found, *odd, *fits)
     fits += _torques(view)
     found += fits if found else _delays(view, fits, columns)  # over a gap no delay can be told
+    found = [f for f in found if _explains_more(view, f)]
     turned = any((s.kind, s.channel) == ("sign", "joint_torque_Nm") for s in found)
     if MOTOR in columns and "joint_torque_Nm" in columns and load != MOTOR and not turned:
         rows = _rows(columns, (INPUT, JOINT, MOTOR, "joint_torque_Nm"))
@@ -96,6 +97,13 @@ def suspicions(config: JointConfig, columns: Mapping[str, FloatArray]) -> tuple[
             found = [s for s in found if s.kind != "delay"]
         found += said
     return (*odd, *found)
+
+
+def _explains_more(view: View, said: Suspicion) -> bool:
+    """Whether the ratio that is seen, where that is what is said, leaves less than the one configured: where a spring's
+    load follows the motor, the slope of a straight line holds what the drive yields."""
+    of_ratio = said.kind in ("ratio", "unit") and "slope_over_ratio" in said.numbers
+    return not of_ratio or view.left(ratio=view.slope) < view.left()
 
 
 def still_doubted(
@@ -140,9 +148,7 @@ def _angles(view: View) -> list[Suspicion]:
         found.append(Suspicion("sign", JOINT, words, {"slope_over_ratio": factor}))
     off = abs(factor)
     loose = _loose(view.config, "radius")
-    # a spring's load follows the motor: a slope then holds what the drive yields, and explains less
-    better = view.left(ratio=view.slope) < view.left()
-    if better and (off > MAGNITUDES_OFF if loose else abs(log(off)) > RATIO_OFF):
+    if off > MAGNITUDES_OFF if loose else abs(log(off)) > RATIO_OFF:
         nearest = min(_ANGLES, key=lambda f: abs(log(off / f)))
         unit = _ANGLES[nearest] if loose or abs(log(off / nearest)) < 0.1 else None
         words = unit or "a gear between encoder and pulley, or a radius that is off"
