@@ -80,9 +80,8 @@ def _tried(
         return None if at.pace.over and c is not chosen[0] else _finished(c, at, fine)
 
     found = [m for m in in_processes(finish, chosen) if m is not None]
-    away = [m for m in found if _away(m, at)]
-    models = ranked_models([m for m in found if not any(m is a for a in away)], at.groups)
-    return _compared(models, at, fine, rng), away
+    models = ranked_models([m for m in found if not _away(m, at)], at.groups)
+    return _compared(models, at, fine, rng), [m for m in found if _away(m, at)]
 
 
 def _away(model: Model, at: Beginning) -> bool:
@@ -213,7 +212,8 @@ def _finished(c: Begun, at: Beginning, fine: Model | None) -> Model | None:
     except InputError:
         return None
     terms = tuple(best_resolved(fit, t, at.pool) if isinstance(t, Hypothesis) else t for t in c.terms)
-    if no_answer(fit, terms[0]) or (at.number > 0 and lost(fit, terms[0])):
+    refused = lost if at.number > 0 else no_answer
+    if refused(fit, terms[0]):
         return None
     ratio = 1.0
     if fine is not None and fit.problem.fine:
