@@ -107,7 +107,7 @@ def joint_solve(d: Drive, terms: Terms, laws: Floats) -> int:
         excess = moved = 0.0
         again, settled = AFRESH, False
         run_terms(d, terms)
-        if d.size.circuits == 1 and x.lengths_follow == 0.0:
+        if d.size.circuits == 1 and x.stiffness_follows == 0.0:
             guess = x.joint
             _distribute(d)
             solved = solve_together(d, terms, laws)

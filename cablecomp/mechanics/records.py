@@ -270,7 +270,8 @@ CONTEXT = record(
         ("rigid", "f8"),  # product of r/R over all stages
         # terms add here too
         ("motor_moment", "f8"),  # between the motor's torque sensor and the cable
-        ("lengths_follow", "f8"),  # 1 once a term's length or stiffness has followed the joint's angle
+        ("stiffness_follows", "f8"),  # 1 once a term's factor of stiffness has followed the joint's angle
+        ("lengths_follow", "f8"),  # 1 once a term's length has
         ("moment_follows", "f8"),  # 1 once a term's moment has
     ]
 )

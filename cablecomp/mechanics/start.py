@@ -32,7 +32,7 @@ def joint_start(
     x = d.context
     x.time = time
     x.first = 1.0
-    x.lengths_follow = x.moment_follows = 0.0
+    x.stiffness_follows = x.lengths_follow = x.moment_follows = 0.0
     x.motor = x.motor_old = motor
     angle = motor
     rigid = 1.0

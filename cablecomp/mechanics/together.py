@@ -1,9 +1,10 @@
-"""A circuit and the terms beside it solved together, where nothing but the terms' moment follows the joint's angle.
+"""A circuit and the terms beside it solved together, where the terms' moment and lengths follow the joint's angle.
 
-What a term takes out of the load path turns with the angle that the cables come to: an inertia, a weight, a bearing.
-Newton's method on all three balances at once (T_l, the joint's angle, the moment on the drum) evaluates the cables once
-a step; to settle them anew for every trial moment, as is done where lengths or stiffness follow the angle as well
-(`joint.py`), takes about twice as many evaluations.
+What a term takes out of the load path turns with the angle that the cables come to: an inertia, a weight, a bearing;
+so does the cable that a pulley beside its centre winds up. Newton's method on all three balances at once (T_l, the
+joint's angle, the moment on the drum) evaluates the cables once a step; to settle them anew for every trial moment, as
+is done where a stiffness follows the angle as well (`joint.py`), takes about twice as many evaluations. The cables keep
+the lengths that they were handed: what lengths grow by meanwhile turns the joint as it is, -weight times that.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from cablecomp.mechanics.status import STATUS_DIVERGED, STATUS_OK
 from cablecomp.mechanics.terms import balance, run_terms, show_tensions
 
 MOST = 10  # steps; where a kink keeps them from settling, the bracketed way does
+TOLD = 1e-9  # turn [rad] from which on a length's growth with it is told from rounding
 
 
 @inner_kernel
@@ -34,6 +36,10 @@ def solve_together(d: Drive, terms: Terms, laws: Floats) -> Solved:
     angle = x.joint
     moment = x.load - x.moment
     length_h, length_l, stiffness_h, stiffness_l = x.length_h, x.length_l, x.stiffness_h, x.stiffness_l
+    # what the lengths grow by turns the chains, and that with the angle; the angle at which it was looked at
+    turned_h = turned_l = by_angle_h = by_angle_l = 0.0
+    looked = angle
+    weight_h, weight_l = d.cables[first_h + count - 1].weight, d.cables[first_l + count - 1].weight
     last_l = d.states[first_l + count - 1]
     unit = d.cables[first_l + count - 1].T0
     if x.moment_slope * x.compliance > 1.0:
@@ -60,20 +66,30 @@ def solve_together(d: Drive, terms: Terms, laws: Floats) -> Solved:
         x.joint = angle
         if x.moment_slope != 0.0:
             x.moment_follows = 1.0
-        follows = x.moment_follows != 0.0  # else the terms are looked at again at the end alone
+        # else the terms are looked at again at the end alone
+        follows = x.moment_follows != 0.0 or x.lengths_follow != 0.0
         if follows:
             show_tensions(d)
             run_terms(d, terms)
+            now_h, now_l = weight_h * (length_h - x.length_h), weight_l * (length_l - x.length_l)
+            if abs(angle - looked) > TOLD:
+                by_angle_h, by_angle_l = (
+                    (now_h - turned_h) / (angle - looked),
+                    (now_l - turned_l) / (angle - looked),
+                )
+                looked = angle
+            turned_h, turned_l = now_h, now_l
         excess = moment - (x.load - x.moment)
         slope = x.moment_slope
         # off: the cables' turn less the angle; gap: between the two chains. The moment's step is put in
         eased, softer = on_h.compliance * excess / radius, on_h.compliance * slope / radius
-        off = rigid + on_h.theta - angle - eased
-        by_angle = on_h.by_shaft - 1.0 - softer
+        off = rigid + on_h.theta + turned_h - angle - eased
+        by_angle = on_h.by_shaft + by_angle_h - 1.0 - softer
         step, turn, compliance = 0.0, -off / by_angle, on_h.compliance / radius
         if closed:
-            gap = on_h.theta + on_l.theta - eased
-            by_tension, by_shaft = on_h.compliance + on_l.compliance, on_h.by_shaft + on_l.by_shaft - softer
+            gap = on_h.theta + turned_h + on_l.theta + turned_l - eased
+            by_tension = on_h.compliance + on_l.compliance
+            by_shaft = on_h.by_shaft + by_angle_h + on_l.by_shaft + by_angle_l - softer
             scale = 1.0 / (by_tension * by_angle - on_h.compliance * by_shaft)
             step = (off * by_shaft - gap * by_angle) * scale
             turn = (gap * on_h.compliance - off * by_tension) * scale
@@ -101,11 +117,19 @@ def solve_together(d: Drive, terms: Terms, laws: Floats) -> Solved:
             show_tensions(d)
             run_terms(d, terms)
             done = abs(moment - (x.load - x.moment)) <= near
-        if done or follows or nudged:
-            same = x.length_h == length_h and x.length_l == length_l
-            if not (same and x.stiffness_h == stiffness_h and x.stiffness_l == stiffness_l):
+            if not follows and (x.length_h != length_h or x.length_l != length_l):
                 x.lengths_follow = 1.0
-                return nowhere
+                done = False
+            elif nudged:
+                missed = weight_h * (length_h - x.length_h) - turned_h - by_angle_h * turn
+                missed_l = weight_l * (length_l - x.length_l) - turned_l - by_angle_l * turn
+                done = done and abs(missed) <= settled and abs(missed_l) <= settled
+        if (done or follows or nudged) and not (
+            x.stiffness_h == stiffness_h and x.stiffness_l == stiffness_l
+        ):
+            x.stiffness_follows = 1.0
+            return nowhere
         if done:
+            show_tensions(d)
             return Solved(angle, compliance, STATUS_OK, 0.0, 0.0)
     return nowhere
