@@ -22,8 +22,8 @@ def joint_text(config: JointConfig, comments: tuple[str, ...] = ()) -> str:
     for stage in stages:
         lines += _table("drive.stage", stage, array=True)
     for name in ("tolerance", "sensors", "observer", "limits", "condition", "remainder"):
-        if data.get(name):
-            lines += _table(name, data[name])
+        if values := {k: v for k, v in (data.get(name) or {}).items() if k != "follows" or v}:
+            lines += _table(name, values)
     for effect in config.effect:
         lines += _table("effect", {"id": effect.id, **effect.parameters}, array=True)
     for law in data["empirical"]:

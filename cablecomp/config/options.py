@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
-from cablecomp.config.base import Finite, Frozen, NonNegative, Positive, Text
+from cablecomp.config.base import Finite, Frozen, Listed, NonNegative, Positive, Text
 
 _NOISE = "white noise, 1 sigma; absent = estimated from the recording"
 _STEP = "resolution: one count"
@@ -38,13 +38,17 @@ class Remainder(Frozen):
 
     Written by the diagnosis that made the joint, where structure stayed beside what it named. A later diagnosis names
     what stands out of it, and calls a mismatch of that size this joint's usual one; absent = whatever stands out of
-    the noise.
+    the noise. `follows`: the covariates that what is left of the joint's angle goes by (`mismatch` in
+    `diagnosis.json` has their names): what goes by one of these has to stand out of all of it.
     """
 
     joint_position_rad: NonNegative | None = Field(None, description=_LEFT)
     motor_torque_Nm: NonNegative | None = Field(None, description=_LEFT)
     tension_h_N: NonNegative | None = Field(None, description=_LEFT)
     tension_l_N: NonNegative | None = Field(None, description=_LEFT)
+    follows: Annotated[tuple[Text, ...], Listed] = Field(
+        (), description="covariates that the rest of the joint's angle goes by"
+    )
 
 
 class EffectEntry(Frozen):

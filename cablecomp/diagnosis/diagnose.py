@@ -18,7 +18,7 @@ from cablecomp.diagnosis.calibration.drive import calibrate_drive, without_histo
 from cablecomp.diagnosis.describe.empirical import empirical_laws
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
 from cablecomp.diagnosis.explain.search import Search, done_without, exchanged, search, without_effects
-from cablecomp.diagnosis.explain.usual import usual_of
+from cablecomp.diagnosis.explain.usual import check_follows, usual_of
 from cablecomp.diagnosis.explain.weighed import Weighed, in_order
 from cablecomp.diagnosis.explain.weighing import weigh
 from cablecomp.diagnosis.locate.remainders import covariates_of
@@ -78,6 +78,7 @@ def _calibrated(
 ) -> Case:
     """The recordings gathered, the drive calibrated on those that are not kept for the end."""
     pace.tell("reading", 0.0)
+    check_follows(config)
     body = gather_body(config, recordings, sessions)
     pace.tell("calibrating the drive", 0.02)
     drive = calibrate_drive(config, body.used, rng)

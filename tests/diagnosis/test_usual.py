@@ -71,6 +71,7 @@ def test_a_joint_whose_diagnosis_left_structure_knows_it_and_is_consistent_with_
     joint = parse_joint(tomllib.loads(joint_text(first.augmented_joint)), "joint")
     left = joint.remainder.joint_position_rad
     assert left == pytest.approx(first.augmented.heldout_own_zero_rmse_rad, rel=0.01)
+    assert "joint_angle" in joint.remainder.follows
     again = diagnose(joint, columns)
     assert (again.verdict, named(again)) == ("consistent", [])
     assert "no more than this joint is known to leave" in in_a_sentence(report_json(again))
@@ -82,6 +83,26 @@ def test_half_of_what_is_left_stands_out_in_its_own_channel() -> None:
     assert lost_in_usual(joint, "joint_position_rad", (1.01e-3) ** 2) == ""
     assert "takes off 0.0009 of `joint_position_rad`" in lost_in_usual(joint, "joint_position_rad", 0.9e-3**2)
     assert lost_in_usual(joint, "motor_torque_Nm", 0.0) == ""
+
+
+def test_what_acts_through_what_that_goes_by_has_to_stand_out_of_all_of_it() -> None:
+    remainder = Remainder(joint_position_rad=2e-3, motor_torque_Nm=1e-3, follows=("motor_angle",))
+    joint = TOLERANT.model_copy(update={"remainder": remainder})
+    angle = ("joint_angle", "motor_angle")
+    lost = lost_in_usual(joint, "joint_position_rad", 1.9e-3**2, angle)
+    assert "known to leave 0.002 that goes by motor angle" in lost
+    assert lost_in_usual(joint, "joint_position_rad", 2.1e-3**2, angle) == ""
+    assert (
+        lost_in_usual(joint, "joint_position_rad", 1.9e-3**2, ("reversal", "velocity", "motor_angle")) == ""
+    )
+    assert lost_in_usual(joint, "motor_torque_Nm", 0.6e-3**2, angle) == ""
+    assert parse_joint(tomllib.loads(joint_text(joint)), "joint").remainder == remainder
+
+
+def test_a_remainder_that_goes_by_nothing_known_is_refused() -> None:
+    joint = TOLERANT.model_copy(update={"remainder": Remainder(follows=("motor_angel",))})
+    with pytest.raises(InputError, match=r"\[remainder\] follows 'motor_angel'.*joint_angle.*other:<name>"):
+        diagnose(joint, {"small/1": recorded([], SECONDS)})
 
 
 def test_a_remainder_below_none_is_refused() -> None:

@@ -30,6 +30,7 @@ from cablecomp.diagnosis.explain.unseen import could_be_unseen
 from cablecomp.diagnosis.locate.location import Location
 from cablecomp.diagnosis.outcome import Case, Outcome
 from cablecomp.diagnosis.result import Diagnosis, Law
+from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.estimation.evidence import JOINT
 from cablecomp.estimation.least_squares import Fit, rms_left
 
@@ -95,12 +96,15 @@ def _augmented(case: Case, outcome: Outcome) -> JointConfig:
 
 
 def _remainder(outcome: Outcome) -> Remainder:
-    """What the joint leaves of each channel, for later diagnoses: of the joint's angle on data left out, of the others
-    where it was fitted; zeros of the recordings apart."""
+    """What the joint leaves of each channel, for later diagnoses: of the joint's angle on data left out, and what that
+    goes by; of the others where it was fitted; zeros of the recordings apart."""
     fit = outcome.kept.fit
     left = {c: rms_left(fit, c) for c in fit.problem.channels}
     left[JOINT] = outcome.augmented.heldout_own_zero_rmse_rad
-    return Remainder(**{c: float(f"{v:.3g}") for c, v in left.items()})
+    follows = outcome.remainder.location.significant(LIMITS.p_structured)
+    most = max((m.share for m in follows), default=0.0)
+    goes_by = tuple(m.covariate for m in follows if m.share >= LIMITS.goes_by * most)
+    return Remainder(**{c: float(f"{v:.3g}") for c, v in left.items()}, follows=goes_by)
 
 
 def _channels(before: Fit, after: Fit) -> dict[str, tuple[float, float]]:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import sqrt
 
 from cablecomp.config import JointConfig
+from cablecomp.diagnosis.locate.covariates import FURTHER, UNITS
 from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.errors import InputError
+from cablecomp.estimation.evidence import JOINT
 
 
 def usual_of(config: JointConfig, channel: str) -> float:
@@ -13,17 +17,29 @@ def usual_of(config: JointConfig, channel: str) -> float:
     return float(getattr(config.remainder, channel) or 0.0)
 
 
+def check_follows(config: JointConfig) -> None:
+    """Raise InputError where the joint says of what it leaves that it goes by something that is no covariate."""
+    for name in config.remainder.follows:
+        if name not in UNITS and not name.startswith(FURTHER):
+            accepted = ", ".join([*UNITS, *(f"{f}<name>" for f in FURTHER)])
+            raise InputError(
+                f"{config.name}: [remainder] follows {name!r}, no covariate; {accepted} are accepted"
+            )
+
+
 def least_square(config: JointConfig, channel: str) -> float:
     """Mean square of a channel, in its unit squared, that an effect has to take off to stand out of that."""
     return LIMITS.usual * usual_of(config, channel) ** 2
 
 
-def lost_in_usual(config: JointConfig, channel: str, gone: float) -> str:
+def lost_in_usual(config: JointConfig, channel: str, gone: float, acts_through: Sequence[str] = ()) -> str:
     """What is to be said of an effect that takes `gone` (mean square) off a channel, in words; "" of one that stands
-    out of what the joint is known to leave."""
-    if gone >= least_square(config, channel):
+    out of what the joint is known to leave: of all of it, where it acts through what that goes by."""
+    usual = usual_of(config, channel)
+    alike = [c for c in acts_through[:2] if channel == JOINT and c in config.remainder.follows]
+    if gone >= (LIMITS.usual_alike if alike else LIMITS.usual) * usual**2:
         return ""
     return (
-        f"it takes off {sqrt(max(gone, 0.0)):.2g} of `{channel}` (RMS), where this joint is known to leave "
-        f"{usual_of(config, channel):.2g}"
+        f"it takes off {sqrt(max(gone, 0.0)):.2g} of `{channel}` (RMS), where this joint is known to leave {usual:.2g}"
+        + (f" that goes by {alike[0].replace('_', ' ')}, as it does" if alike else "")
     )

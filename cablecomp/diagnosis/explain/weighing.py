@@ -122,7 +122,7 @@ def _weighed(
     elif other := another(final, term, selection.rounds, lead):
         confidence, why_not = min(confidence, LIMITS.beaten_told), other
     elif little := (
-        too_little(removes, share_left * _beyond_noise(final.fit)) or _beside_usual(selection, most)
+        too_little(removes, share_left * _beyond_noise(final.fit)) or _beside_usual(selection, term, most)
     ):
         confidence, why_not = min(confidence, LIMITS.little_told), little
     elif small := slight(final, term, selection.rounds, own, removes):
@@ -229,11 +229,11 @@ def _share(selection: Selection, gone: FloatArray) -> float:
     return float(np.clip(np.max(_shares(selection, gone)), 0.0, 1.0))
 
 
-def _beside_usual(selection: Selection, gone: FloatArray) -> str:
+def _beside_usual(selection: Selection, term: Hypothesis, gone: FloatArray) -> str:
     """What is to be said of an effect that does not stand out of what the joint is known to leave of that channel."""
     problem = selection.baseline.fit.problem
     k = int(np.argmax(_shares(selection, gone)))
-    return lost_in_usual(problem.config, list(problem.spans())[k], float(gone[k]))
+    return lost_in_usual(problem.config, list(problem.spans())[k], float(gone[k]), term.acts_through)
 
 
 def _mean_squares(model: Model, groups: Groups, tail: float = LIMITS.tail) -> FloatArray:
