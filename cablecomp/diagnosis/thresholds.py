@@ -415,10 +415,6 @@ class Thresholds:
     """Standard errors by which what another law's form may leave has to be ahead of none and of its nearest rival,
     either in any form, beside an effect that takes off more: 15 of 17 such names below it were wrong, of 200 other
     further names 25 (trials seeds 749, 750, 805, 806 and 970 to 974)."""
-    sure_beside: float = 0.8
-    """Confidence from which on a further law has a name beside one that takes off more: below it 9 of 20 such names
-    were right, above it 29 of 37; of those that move the joint most 19 of 21 below it (trials seeds 755 to 758, 819 to
-    821 and 980)."""
     curve_beside: float = 0.15
     """Share of the mismatch, as the last to come, up to which a form may leave a curve of the load or the pressure, or
     a slow drift (eight of eight such names were wrong; of five that took off more two were)."""

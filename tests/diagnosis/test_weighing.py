@@ -156,27 +156,6 @@ def test_what_another_form_may_leave_has_to_be_far_ahead_beside_what_takes_off_m
     assert clear_of_forms(after_a_delay, known=True) == after_a_delay
 
 
-@pytest.mark.parametrize(
-    ("name", "removes", "confidence", "keeps"),
-    [
-        ("bearing_friction", 0.2, 0.75, False),
-        ("bearing_friction", 0.2, 0.85, True),
-        ("bearing_friction", 0.8, 0.75, True),  # takes off more than the other
-        ("clock_skew", 0.2, 0.75, True),  # no form is late
-    ],
-)
-def test_beside_what_takes_off_more_a_doubtful_name_is_none(
-    name: str, removes: float, confidence: float, keeps: bool
-) -> None:
-    two = [_weighed("routing_friction", 0.7, 0.9), _weighed(name, removes, confidence, 8.0, removes)]
-    assert clear_of_forms(two, known=False) == two
-    first, further = clear_of_forms(two, known=True)
-    assert first == two[0]
-    assert (further == two[1]) is keeps
-    assert (further.confidence >= LIMITS.name) is keeps
-    assert ("sure to 75%" in further.why_not) is not keeps
-
-
 def test_only_what_follows_an_effects_own_covariates_beyond_chance_counts() -> None:
     """Of three covariates one is another effect's, one follows by chance."""
     left: Any = SimpleNamespace(

@@ -66,9 +66,9 @@ def one_in_series(weighed: Sequence[Weighed]) -> list[Weighed]:
 
 
 def clear_of_forms(weighed: Sequence[Weighed], *, known: bool) -> list[Weighed]:
-    """The same, where beside a named effect that takes off more a doubtful name is none, and what another law's form
-    may leave keeps its name only if it is far ahead: no delay, which has one form. Of a drive that is not `known`, but
-    by order of magnitude, a share of the mismatch says nothing.
+    """The same, where what another law's form may leave keeps its name beside a named effect that takes off more only
+    if it is far ahead: no delay, which has one form. Of a drive that is not `known`, but by order of magnitude, a share
+    of the mismatch says nothing.
     """
     if not known:
         return list(weighed)
@@ -78,22 +78,14 @@ def clear_of_forms(weighed: Sequence[Weighed], *, known: bool) -> list[Weighed]:
 
 
 def _left_by_a_form(w: Weighed) -> Weighed:
-    """The same without its name, if that is doubtful, or it is so small a curve or drift as other laws' forms leave, or
-    takes off little of whatever kind, and is not far ahead."""
+    """The same without its name, if it is so small a curve or drift as other laws' forms leave, or takes off little of
+    whatever kind, and is not far ahead."""
     lead = w.evidence["lead"]
     most = LIMITS.curve_beside if w.term.effect.fills_in else LIMITS.little_beside
-    if w.term.is_delay:
+    if w.term.is_delay or lead >= LIMITS.z_beside or w.evidence["share_total"] >= most:
         return w
-    if w.confidence < LIMITS.sure_beside:
-        why_not = (
-            f"the form of what takes off more may leave this beside it: as a name it would be sure to "
-            f"{w.confidence:.0%}, {LIMITS.sure_beside:.0%} are asked for"
-        )
-    elif lead < LIMITS.z_beside and w.evidence["share_total"] < most:
-        why_not = (
-            f"the form of what takes off more may leave this beside it; it is ahead of its nearest rival or of none by "
-            f"{lead:.1f} standard errors, {LIMITS.z_beside:g} are asked for"
-        )
-    else:
-        return w
+    why_not = (
+        f"the form of what takes off more may leave this beside it; it is ahead of its nearest rival or of none by "
+        f"{lead:.1f} standard errors, {LIMITS.z_beside:g} are asked for"
+    )
     return replace(w, confidence=LIMITS.little_told, why_not=why_not)
