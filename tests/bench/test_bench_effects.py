@@ -139,7 +139,7 @@ def seconds(config: JointConfig, columns: dict[str, np.ndarray]) -> float:
 @pytest.mark.benchmark(group="replay, the output pulley off its centre")
 @pytest.mark.parametrize("share", [0.01, 0.1, 0.25, 0.5])
 def test_runout_over_plain(benchmark: Any, share: float) -> None:
-    """How many plain rows a row costs whose cable lengths follow the angle; about three, however far off."""
+    """How many plain rows a row costs whose cable lengths follow the angle; less than two, however far off."""
     config, columns = load_joint(FINGER), course(1e-3)
     stage = config.drive.stage[-1]
     effect = ("pulley_runout", {"eccentricity_m": share * stage.output_radius_m, "phase_rad": 0.5})
