@@ -451,8 +451,8 @@ class Thresholds:
     of it, as RMS (pieces of the jaw's `L_4`, seeds 76 to 79: what had been concealed took 0.4 and more, gravity and
     delays named in twins up to 0.15)."""
     usual_alike: float = 1.0
-    """The same of an effect that acts through what that goes by: another recording of the same machine has more or less
-    of it (twins of the jaw's `L_4`, seed 127: gravity took 0.4 and 0.7, weights that were put there 1.4 and more)."""
+    """The same of an effect that acts first through what that goes by: another recording of the same machine has more
+    or less of it (twins of the jaw's `L_4`, seed 127: gravity took 0.4 and 0.7, of seed 135 more than 1)."""
     goes_by: float = 0.5
     """Share of what is left, over that of the covariate that it follows most, from which it is known to go by another
     as well: a joint that swings to and fro has them all alike."""

@@ -34,9 +34,9 @@ def least_square(config: JointConfig, channel: str) -> float:
 
 def lost_in_usual(config: JointConfig, channel: str, gone: float, acts_through: Sequence[str] = ()) -> str:
     """What is to be said of an effect that takes `gone` (mean square) off a channel, in words; "" of one that stands
-    out of what the joint is known to leave: of all of it, where it acts through what that goes by."""
+    out of what the joint is known to leave: of all of it, where what it acts through first is what that goes by."""
     usual = usual_of(config, channel)
-    alike = [c for c in acts_through[:2] if channel == JOINT and c in config.remainder.follows]
+    alike = [c for c in acts_through[:1] if channel == JOINT and c in config.remainder.follows]
     if gone >= (LIMITS.usual_alike if alike else LIMITS.usual) * usual**2:
         return ""
     return (
