@@ -81,11 +81,28 @@ def reference(model: type[BaseModel], preface: str = "") -> str:
     lines = [preface]
     for table in tables_of(model):
         lines += ["", table.head, *(f"  {line}".rstrip() for line in table.text.splitlines())]
-        for key in table.keys:
-            unit = f" [{key.unit}]" if key.unit else ""
-            words = [key.meaning, key.accepted, key.default]
-            lines.append(f"  {key.name}{unit}: {'; '.join(w for w in words if w)}")
+        lines += [f"  {_with_unit(key)}: {_words(key)}" for key in table.keys]
     return "\n".join(lines).strip("\n") + "\n"
+
+
+def keys_of(model: type[BaseModel]) -> Iterator[tuple[str, str]]:
+    """Every key of a model itself with its unit, and its words: of a table in it, what that is."""
+    for key, field in ((f.alias or n, f) for n, f in model.model_fields.items()):
+        kinds, shape = _kinds(field.annotation)
+        if kinds:
+            inside = " | ".join(k.__name__ for k in kinds)
+            yield key, {"": inside, _ARRAY: f"array of {inside}"}.get(shape, f"table of {inside} by name")
+        else:
+            found = _key(key, field)
+            yield _with_unit(found), _words(found)
+
+
+def _with_unit(key: Key) -> str:
+    return f"{key.name} [{key.unit}]" if key.unit else key.name
+
+
+def _words(key: Key) -> str:
+    return "; ".join(w for w in (key.meaning, key.accepted, key.default) if w)
 
 
 def _tag(kind: type[BaseModel]) -> str:
@@ -123,24 +140,25 @@ def _kinds(annotation: Any) -> tuple[tuple[type[BaseModel], ...], str]:
 
 
 def _accepted(field: FieldInfo) -> str:
-    words = _kind(field.annotation)
+    words = kind_of(field.annotation)
     limits = [_limit(m) for m in field.metadata]
     return ", ".join(dict.fromkeys([words, *(w for w in limits if w)]))
 
 
-def _kind(annotation: Any) -> str:
+def kind_of(annotation: Any) -> str:
+    """What an annotation accepts, in words."""
     origin, inner = get_origin(annotation), get_args(annotation)
     if origin is Literal:
         return " | ".join(repr(v) for v in inner)
     if origin is Annotated:
         limits = [_limit(m) for part in inner[1:] for m in getattr(part, "metadata", (part,))]
-        return " ".join([_kind(inner[0]), *dict.fromkeys(w for w in limits if w)])
+        return " ".join([kind_of(inner[0]), *dict.fromkeys(w for w in limits if w)])
     if origin is tuple:
-        return f"array of {_kind(inner[0])}"
+        return f"array of {kind_of(inner[0])}"
     if origin is dict:
-        return f"table of {_kind(inner[1])}"
+        return f"table of {kind_of(inner[1])}"
     if origin is not None:  # a union
-        return " | ".join(_kind(part) for part in inner if part is not type(None))
+        return " | ".join(kind_of(part) for part in inner if part is not type(None))
     plain = {float: "number", int: "whole number", str: "text", bool: "true | false"}
     return plain.get(annotation, getattr(annotation, "__name__", "anything"))
 

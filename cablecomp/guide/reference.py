@@ -7,7 +7,11 @@ import re
 from collections.abc import Iterator
 from importlib import import_module
 from types import ModuleType
-from typing import Any, Final
+from typing import Annotated, Any, Final, get_origin
+
+from pydantic import BaseModel
+
+from cablecomp.config.reference import keys_of, kind_of
 
 PACKAGES: Final = ("cablecomp", "cablecomp.config", "cablecomp.effects", "cablecomp.links")
 """Packages whose `__all__` is public."""
@@ -35,10 +39,16 @@ def _entry(name: str, thing: Any) -> Iterator[str]:
     if isinstance(thing, ModuleType) or not callable(thing):
         return
     yield f"### {name}"
+    if get_origin(thing) is Annotated:
+        yield f"A {kind_of(thing)}."
+        return
     is_error = inspect.isclass(thing) and issubclass(thing, BaseException)
-    if not is_error:
+    is_table = inspect.isclass(thing) and issubclass(thing, BaseModel)
+    if not (is_error or is_table):
         yield f"```text\n{name}{_signature(thing)}\n```"
     yield _words(thing)
+    if is_table:
+        yield "\n".join(f"- `{key}`{f': {words}' if words else ''}" for key, words in keys_of(thing))
     if inspect.isclass(thing) and not is_error:
         for key, member in vars(thing).items():
             if key.startswith("_") or not isinstance(

@@ -72,6 +72,17 @@ def test_the_reference_holds_every_public_name() -> None:
     assert "`Observer.step`" in text
 
 
+def test_the_reference_tells_a_configurations_keys_in_words() -> None:
+    text = topics.text_of(topics.REFERENCE)
+    assert not re.search(r"FieldInfo|Annotated|Pydantic", text)
+    assert "- `sensors`: Sensors\n- `effect`: array of EffectEntry\n" in text
+    assert (
+        "- `joint_torque_offset_Nm [Nm]`: what the joint torque sensor reads without load; number; default 0.0"
+        in text
+    )
+    assert "### Positive\n\nA number > 0." in text
+
+
 def test_the_guide_says_of_confidence_what_its_file_holds() -> None:
     text = " ".join(topics.text_of("trials").split())
     file = Path(cablecomp.__file__).parent / "diagnosis" / "explain" / "confidence.json"
