@@ -88,12 +88,11 @@ def test_half_of_what_is_left_stands_out_in_its_own_channel() -> None:
 def test_what_acts_through_what_that_goes_by_has_to_stand_out_of_all_of_it() -> None:
     remainder = Remainder(joint_position_rad=2e-3, motor_torque_Nm=1e-3, follows=("joint_angle", "load"))
     joint = TOLERANT.model_copy(update={"remainder": remainder})
-    angle = ("joint_angle", "motor_angle")
-    lost = lost_in_usual(joint, "joint_position_rad", 1.9e-3**2, angle)
+    lost = lost_in_usual(joint, "joint_position_rad", 1.9e-3**2, "joint_angle")
     assert "known to leave 0.002 that goes by joint angle" in lost
-    assert lost_in_usual(joint, "joint_position_rad", 2.1e-3**2, angle) == ""
-    assert lost_in_usual(joint, "joint_position_rad", 1.9e-3**2, ("time", "load")) == ""
-    assert lost_in_usual(joint, "motor_torque_Nm", 0.6e-3**2, angle) == ""
+    assert lost_in_usual(joint, "joint_position_rad", 2.1e-3**2, "joint_angle") == ""
+    assert lost_in_usual(joint, "joint_position_rad", 1.9e-3**2, "time") == ""
+    assert lost_in_usual(joint, "motor_torque_Nm", 0.6e-3**2, "joint_angle") == ""
     assert parse_joint(tomllib.loads(joint_text(joint)), "joint").remainder == remainder
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import sqrt
 
 from cablecomp.config import JointConfig
@@ -27,19 +26,26 @@ def check_follows(config: JointConfig) -> None:
             )
 
 
-def least_square(config: JointConfig, channel: str) -> float:
-    """Mean square of a channel, in its unit squared, that an effect has to take off to stand out of that."""
-    return LIMITS.usual * usual_of(config, channel) ** 2
+def least_square(config: JointConfig, channel: str, through: str = "") -> float:
+    """Mean square of a channel, in its unit squared, that an effect has to take off to stand out of that; of all of it
+    where that goes by the covariate that the effect acts through first (`through`)."""
+    share = LIMITS.usual_alike if _goes_by(config, channel, through) else LIMITS.usual
+    return share * usual_of(config, channel) ** 2
 
 
-def lost_in_usual(config: JointConfig, channel: str, gone: float, acts_through: Sequence[str] = ()) -> str:
+def lost_in_usual(config: JointConfig, channel: str, gone: float, through: str = "") -> str:
     """What is to be said of an effect that takes `gone` (mean square) off a channel, in words; "" of one that stands
-    out of what the joint is known to leave: of all of it, where what it acts through first is what that goes by."""
-    usual = usual_of(config, channel)
-    alike = [c for c in acts_through[:1] if channel == JOINT and c in config.remainder.follows]
-    if gone >= (LIMITS.usual_alike if alike else LIMITS.usual) * usual**2:
+    out of what the joint is known to leave."""
+    if gone >= least_square(config, channel, through):
         return ""
-    return (
-        f"it takes off {sqrt(max(gone, 0.0)):.2g} of `{channel}` (RMS), where this joint is known to leave {usual:.2g}"
-        + (f" that goes by {alike[0].replace('_', ' ')}, as it does" if alike else "")
+    alike = (
+        f" that goes by {through.replace('_', ' ')}, as it does" if _goes_by(config, channel, through) else ""
     )
+    return (
+        f"it takes off {sqrt(max(gone, 0.0)):.2g} of `{channel}` (RMS), where this joint is known to leave "
+        f"{usual_of(config, channel):.2g}{alike}"
+    )
+
+
+def _goes_by(config: JointConfig, channel: str, covariate: str) -> bool:
+    return channel == JOINT and covariate in config.remainder.follows

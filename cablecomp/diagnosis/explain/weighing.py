@@ -233,7 +233,7 @@ def _beside_usual(selection: Selection, term: Hypothesis, gone: FloatArray) -> s
     """What is to be said of an effect that does not stand out of what the joint is known to leave of that channel."""
     problem = selection.baseline.fit.problem
     k = int(np.argmax(_shares(selection, gone)))
-    return lost_in_usual(problem.config, list(problem.spans())[k], float(gone[k]), term.acts_through)
+    return lost_in_usual(problem.config, list(problem.spans())[k], float(gone[k]), term.acts_through[0])
 
 
 def _mean_squares(model: Model, groups: Groups, tail: float = LIMITS.tail) -> FloatArray:
