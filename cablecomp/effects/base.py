@@ -236,8 +236,6 @@ class Effect:
     and the cables' tensions do not change by it."""
     pliant: bool = False
     """It is a mere curve over the load, or a step: it bends to what other effects' forms leave, too."""
-    fills_in: bool = False
-    """It is a curve of the load or the pressure, or a slow drift, as the forms of other effects leave."""
     in_series: bool = False
     """It gives way to the load in series with the joint: of several that do, recordings show one curve."""
     saturates: bool = False

@@ -134,7 +134,6 @@ EFFECT = Effect(
     ),
     acts_through=("load", "load_direction", "reversal"),
     bounded=True,
-    fills_in=True,
     change=_change,
     at_pretension=_at_pretension,
 )

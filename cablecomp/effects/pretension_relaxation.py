@@ -153,7 +153,6 @@ EFFECT = Effect(
     ),
     acts_through=("time",),
     bounded=True,
-    fills_in=True,
     change=_change,
     tries=tuple(
         {"began_s": 0.0, "power": m, "time_constant_s": t}

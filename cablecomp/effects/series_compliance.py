@@ -259,7 +259,6 @@ EFFECT = Effect(
     acts_through=("load", "load_rate"),
     bounded=True,
     pliant=True,
-    fills_in=True,
     in_series=True,
     change=_change,
     tries=(

@@ -15,9 +15,8 @@ from cablecomp.diagnosis.explain import weighing
 from cablecomp.diagnosis.explain.confidence import learnt
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.scores import ScoreDifference
-from cablecomp.diagnosis.explain.weighed import Weighed, clear_of_forms, in_order, one_in_series
+from cablecomp.diagnosis.explain.weighed import Weighed, in_order, one_in_series
 from cablecomp.diagnosis.explain.weighing import _against, _at_bound, _follows, _unfollowed
-from cablecomp.diagnosis.thresholds import LIMITS
 
 
 @pytest.mark.parametrize(
@@ -124,36 +123,6 @@ def test_of_a_coupling_and_a_clearance_one_has_the_name(
         was = sizes[w.term.name][1]
         assert (w.confidence == was) is (w.term.name in named or was < 0.5)
         assert ("one curve of the load" in w.why_not) is (w.confidence != was)
-
-
-@pytest.mark.parametrize(
-    ("name", "removes", "last", "lead", "beside", "keeps"),
-    [
-        ("pressure_dependent_friction", 0.1, 0.1, 3.2, 0.9, False),
-        ("pretension_relaxation", 0.1, 0.1, 2.5, 0.9, False),
-        ("series_compliance", 0.1, 0.1, 3.1, 0.9, False),
-        ("series_compliance", 0.1, 0.1, 7.6, 0.9, True),  # far ahead
-        ("series_compliance", 0.3, 0.3, 3.1, 0.9, True),  # so large
-        ("series_compliance", 0.8, 0.8, 3.1, 0.9, True),  # takes off more than the other
-        ("series_compliance", 0.1, 0.1, 3.1, 0.4, True),  # the other has no name
-        ("viscous_slip", 0.2, 0.2, 3.1, 0.9, True),  # no such curve
-        ("viscous_slip", 0.2, 0.001, 3.1, 0.9, False),  # hardly missed
-        ("viscous_slip", 0.2, 0.001, 7.6, 0.9, True),
-        ("clock_skew", 0.001, 0.001, 3.1, 0.9, True),  # no form is late
-    ],
-)
-def test_what_another_form_may_leave_has_to_be_far_ahead_beside_what_takes_off_more(
-    name: str, removes: float, last: float, lead: float, beside: float, keeps: bool
-) -> None:
-    two = [_weighed("routing_friction", 0.7, beside), _weighed(name, removes, 0.8, lead, last)]
-    assert clear_of_forms(two, known=False) == two
-    first, further = clear_of_forms(two, known=True)
-    assert first.confidence == beside
-    assert (further.confidence == 0.8) is keeps
-    assert (further.confidence < LIMITS.name) is not keeps
-    assert (f"{lead} standard errors" in further.why_not) is not keeps
-    after_a_delay = [_weighed("clock_skew", 0.7, beside), two[1]]
-    assert clear_of_forms(after_a_delay, known=True) == after_a_delay
 
 
 def test_only_what_follows_an_effects_own_covariates_beyond_chance_counts() -> None:

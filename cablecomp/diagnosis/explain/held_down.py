@@ -42,21 +42,19 @@ def too_little(removes: float, left: float) -> str:
 def slight(
     final: Model, term: Hypothesis, rounds: Sequence[Round], own: ScoreDifference, removes: float
 ) -> str:
-    """What is to be said of an effect beside others whose form, or chance, may do as well what it does, `removes` of
-    the mismatch and `own` of what is left without it; "" of one that does more. What takes off no more than a tie is
-    not missed, whatever it does alone, unless nearly all data choose it alone: that others do as well together is
-    chance then. What a further effect would have to be missed by tells it from a form. What is late differs in time,
-    which no form does, but chance may.
+    """What is to be said of an effect beside others that is not missed, or of one that gives way in series and of which
+    their form may do as well what it does, `removes` of the mismatch and `own` of what is left without it; "" of any
+    other. What takes off no more than a tie is not missed, whatever it does alone, unless nearly all data choose it
+    alone: that others do as well together is chance then. What a further effect would have to be missed by tells it
+    from a form.
     """
     if sum(isinstance(t, Hypothesis) for t in final.terms) < 2:
         return ""
     if own.gain < LIMITS.tie and not surest_alone(rounds, term):
         return "without it the others predict data left out as well"
     slightly = removes < LIMITS.slight and own.gain < LIMITS.slight_gain and own.z < LIMITS.z
-    if slightly and not term.is_delay:
+    if slightly and term.effect.in_series:
         return f"it takes off {removes:.1%} of the mismatch, which the form of what takes off the rest may do as well"
-    if removes < LIMITS.slight_by_chance and own.z < LIMITS.z_slight:
-        return f"it takes off {removes:.1%} of the mismatch, z = {own.z:.1f} beside the others: chance may do as well"
     return ""
 
 
@@ -91,10 +89,11 @@ def in_part_a_drag(final: Model, term: Hypothesis, rounds: Sequence[Round], lead
     return "in part it goes with speed and in part it does not: whatever yields late does alike"
 
 
-def hardly_ahead(term: Hypothesis, lead: float) -> str:
-    """What is to be said of an effect that bends to what others' forms leave and is not clearly ahead, `lead` standard
-    errors, of none or of its nearest rival; "" of any other."""
-    if not term.effect.pliant or lead >= LIMITS.z_pliant:
+def hardly_ahead(final: Model, term: Hypothesis, lead: float) -> str:
+    """What is to be said of an effect beside others that bends to what their forms leave and is not clearly ahead,
+    `lead` standard errors, of none or of its nearest rival; "" of any other."""
+    alone = sum(isinstance(t, Hypothesis) for t in final.terms) < 2
+    if alone or not term.effect.pliant or lead >= LIMITS.z_pliant:
         return ""
     return (
         f"a curve or a step that other effects' forms leave as well, ahead of its nearest rival or of none by "

@@ -1,5 +1,4 @@
-"""An effect as weighed, and what may not be named beside another: a second of what gives way in series, a curve that
-another law's form leaves."""
+"""An effect as weighed, and what may not be named beside another: a second of what gives way in series."""
 
 from __future__ import annotations
 
@@ -63,29 +62,3 @@ def one_in_series(weighed: Sequence[Weighed]) -> list[Weighed]:
         else w
         for w in weighed
     ]
-
-
-def clear_of_forms(weighed: Sequence[Weighed], *, known: bool) -> list[Weighed]:
-    """The same, where what another law's form may leave keeps its name beside a named effect that takes off more only
-    if it is far ahead: no delay, which has one form. Of a drive that is not `known`, but by order of magnitude, a share
-    of the mismatch says nothing.
-    """
-    if not known:
-        return list(weighed)
-    laws = (w for w in weighed if w.confidence >= LIMITS.name and not w.term.is_delay)
-    most = max((w.removes for w in laws), default=0.0)
-    return [_left_by_a_form(w) if w.confidence >= LIMITS.name and w.removes < most else w for w in weighed]
-
-
-def _left_by_a_form(w: Weighed) -> Weighed:
-    """The same without its name, if it is so small a curve or drift as other laws' forms leave, or takes off little of
-    whatever kind, and is not far ahead."""
-    lead = w.evidence["lead"]
-    most = LIMITS.curve_beside if w.term.effect.fills_in else LIMITS.little_beside
-    if w.term.is_delay or lead >= LIMITS.z_beside or w.evidence["share_total"] >= most:
-        return w
-    why_not = (
-        f"the form of what takes off more may leave this beside it; it is ahead of its nearest rival or of none by "
-        f"{lead:.1f} standard errors, {LIMITS.z_beside:g} are asked for"
-    )
-    return replace(w, confidence=LIMITS.little_told, why_not=why_not)

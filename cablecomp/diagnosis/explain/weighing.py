@@ -34,7 +34,7 @@ from cablecomp.diagnosis.explain.scores import ScoreDifference, halves, scales, 
 from cablecomp.diagnosis.explain.search import Search
 from cablecomp.diagnosis.explain.ties import surest_alone
 from cablecomp.diagnosis.explain.usual import lost_in_usual
-from cablecomp.diagnosis.explain.weighed import Weighed, clear_of_forms, one_in_series
+from cablecomp.diagnosis.explain.weighed import Weighed, one_in_series
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.locate.location import Location
 from cablecomp.diagnosis.thresholds import LIMITS
@@ -42,7 +42,6 @@ from cablecomp.effects.catalogue import parameter_of
 from cablecomp.estimation.evidence import JOINT, noise_rms
 from cablecomp.estimation.least_squares import Fit, rms_left
 from cablecomp.estimation.parallel import in_processes
-from cablecomp.estimation.parameter import vague_drive
 from cablecomp.signal.smoothing import FloatArray
 
 NO_SIZE: Final = ("length", "instant", "duration")
@@ -65,8 +64,7 @@ def weigh(
     terms = [t for t in final.terms if isinstance(t, Hypothesis)]
     drawn = zip(terms, rng.spawn(len(terms)), strict=True)
     weighed = in_processes(lambda t: _weighed(found, t[0], pool, left, locate, share_left, t[1]), [*drawn])
-    known = not vague_drive(final.fit.problem.parameters)
-    return sorted(clear_of_forms(one_in_series(weighed), known=known), key=lambda w: -w.confidence)
+    return sorted(one_in_series(weighed), key=lambda w: -w.confidence)
 
 
 def _weighed(
@@ -129,7 +127,7 @@ def _weighed(
         confidence, why_not = min(confidence, LIMITS.little_told), small
     elif open_to := (
         stands_in(final, term, found.put_in, own)
-        or hardly_ahead(term, lead)
+        or hardly_ahead(final, term, lead)
         or seen_once(final, term, lead)
         or greased(final, term)
         or in_part_a_drag(final, term, selection.rounds, lead)
