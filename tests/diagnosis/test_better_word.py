@@ -173,12 +173,20 @@ def test_an_inertia_that_swings_away_as_a_whole_is_none(
 
 
 @pytest.mark.parametrize(
-    ("exponent", "lost", "word"), [(-0.3, -0.5, "lost"), (0.0, -0.5, ""), (-0.3, 0.5, ""), (0.5, -0.5, "")]
+    ("exponent", "lost", "word"),
+    [
+        (-0.3, -0.5, "lost"),
+        (-0.3, 0.5, "lost"),
+        (-0.3, 0.0, ""),
+        (0.0, -0.5, ""),
+        (0.5, -0.5, ""),
+        (0.5, 0.5, ""),
+    ],
 )
-def test_a_coefficient_that_grows_with_the_pressure_both_ways_is_another_friction(
+def test_a_coefficient_that_grows_by_a_power_and_turns_beyond_a_pressure_is_another_friction(
     exponent: float, lost: float, word: str
 ) -> None:
-    """A film of grease that is pressed through gains beyond a pressure, and not by a power as well."""
+    """A film of grease that is pressed through gains or loses beyond a pressure, and does not grow by a power, too."""
     law = hypothesis("pressure_dependent_friction", "pressure_dependent_friction")
     values = {law.key("exponent"): exponent, law.key("lost"): lost}
     problem = SimpleNamespace(parameters=(), config=JOINT)
