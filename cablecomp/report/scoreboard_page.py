@@ -82,6 +82,7 @@ def _named_by_size(board: Scoreboard) -> Section:
 
 
 def _confidence(board: Scoreboard) -> Section:
+    mean, low, high = (page.number(v) for v in board.trust.perfect)
     return Section(
         "Confidence",
         page.columns(
@@ -91,8 +92,8 @@ def _confidence(board: Scoreboard) -> Section:
             ),
             page.figure(figures.risk(board), "Of the surest share of them, how many are wrong."),
         ),
-        f"Expected calibration error {page.number(board.trust.error)}, Brier "
-        f"score {page.number(board.trust.brier)}.",
+        f"Expected calibration error {page.number(board.trust.error)} (as many effects, each right with exactly its "
+        f"confidence, show {mean}; 95 %: {low} to {high}), Brier score {page.number(board.trust.brier)}.",
     )
 
 

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 BINS = 10
+DRAWS = 400
+"""Sets drawn for what a perfect confidence would show."""
 
 
 def calibration_error(probability: Sequence[float], right: Sequence[bool], bins: int = BINS) -> float:
@@ -25,6 +27,19 @@ def calibration_error(probability: Sequence[float], right: Sequence[bool], bins:
     return float(
         sum(len(p) * abs(float(np.mean(y)) - float(np.mean(p))) for p, y in parts) / len(probability)
     )
+
+
+def perfect_error(probability: Sequence[float], bins: int = BINS) -> tuple[float, float, float]:
+    """Calibration error that probabilities which are exactly right show by chance alone: (mean, 2.5 and 97.5 %) over
+    sets of as many, each right with its own probability (J. Bröcker and L. Smith, Weather and Forecasting 22, 2007);
+    bins of few effects never agree. NaN for none.
+    """
+    if not len(probability):
+        return nan, nan, nan
+    rng, p = np.random.default_rng(0), np.asarray(probability, dtype=np.float64)
+    drawn = [calibration_error(probability, (rng.random(len(p)) < p).tolist(), bins) for _ in range(DRAWS)]
+    low, high = np.quantile(drawn, (0.025, 0.975))
+    return float(np.mean(drawn)), float(low), float(high)
 
 
 def equal_counts(

@@ -11,7 +11,14 @@ from typing import Any
 import numpy as np
 
 from cablecomp.diagnosis.thresholds import LIMITS
-from cablecomp.trials.calibrated import brier, calibration_error, equal_counts, risk_area, risk_coverage
+from cablecomp.trials.calibrated import (
+    brier,
+    calibration_error,
+    equal_counts,
+    perfect_error,
+    risk_area,
+    risk_coverage,
+)
 from cablecomp.trials.row import Named, Row
 from cablecomp.trials.shares import Rate, bootstrapped, finite, quantile, rate
 
@@ -57,12 +64,14 @@ class Part:
 
 @dataclass(frozen=True)
 class Trust:
-    """Whether confidence can be trusted, over all effects that were weighed: expected calibration error, Brier
-    score, area under risk against coverage by confidence and by z alone, the curve itself, and the bins that the
-    calibration error counts (lowest, highest, mean confidence, true)."""
+    """Whether confidence can be trusted, over all effects that were weighed: expected calibration error, that of a
+    perfect confidence on as many (mean, 2.5 and 97.5 %), Brier score, area under risk against coverage by confidence
+    and by z alone, the curve itself, and the bins that the calibration error counts (lowest, highest, mean confidence,
+    true)."""
 
     of: int
     error: float
+    perfect: tuple[float, float, float]
     brier: float
     area: float
     area_by_z: float
@@ -152,6 +161,8 @@ def _of_confidence(rows: Sequence[Row], trust: Trust) -> Iterable[Target]:
     over = trust.area / trust.area_by_z if trust.area_by_z > 0.0 else nan
     error = "confidence: expected calibration error"
     yield Target(error, trust.error, (nan, nan), trust.of, None, 0.05, "1")
+    mean, low, high = trust.perfect
+    yield Target("confidence: that of a perfect one, as many effects", mean, (low, high), trust.of, unit="1")
     area = "confidence: area under risk–coverage, over that of z alone"
     yield Target(area, over, (nan, nan), trust.of, None, 1.0, "1")
     held = rate(z, lambda e: abs(e[0]) <= 1.96)
@@ -259,6 +270,7 @@ def _trust(weighed: Sequence[Named]) -> Trust:
     return Trust(
         len(known),
         calibration_error(p, right),
+        perfect_error(p),
         brier(p, right),
         risk_area(p, right),
         risk_area(by_z, right),

@@ -14,7 +14,7 @@ from scipy.optimize import minimize
 from cablecomp.diagnosis.explain.confidence import derived, features_of_tried, logistic
 from cablecomp.diagnosis.explain.conformal import conformal_level, conformal_set, deficits
 from cablecomp.errors import InputError
-from cablecomp.trials.calibrated import calibration_error, risk_area, risk_coverage
+from cablecomp.trials.calibrated import calibration_error, perfect_error, risk_area, risk_coverage
 from cablecomp.trials.learn import fit_logistic, judged_in, learnt_from, main
 
 LAWS = [f"effect_{k}:law" for k in range(20)]
@@ -136,6 +136,17 @@ def test_calibration_error_and_risk_by_hand() -> None:
     np.testing.assert_allclose(coverage, [1 / 3, 2 / 3, 1.0])
     np.testing.assert_allclose(risk, [0.0, 0.0, 1 / 3])
     assert risk_area([0.1, 0.9], [False, True]) < risk_area([0.9, 0.1], [False, True])
+
+
+def test_what_a_perfect_confidence_shows_by_chance_is_told() -> None:
+    """In one bin of n effects of probability p the error is the mean of |share - p|, sqrt(2 p (1 - p)/(pi n)) for many;
+    sure ones have none."""
+    mean, low, high = perfect_error([0.5] * 100, bins=1)
+    assert mean == pytest.approx(np.sqrt(2.0 * 0.25 / (np.pi * 100)), rel=0.1)
+    assert low == pytest.approx(0.0, abs=0.011)
+    assert high == pytest.approx(1.96 * 0.05, rel=0.15)
+    assert perfect_error([1.0] * 20) == (0.0, 0.0, 0.0)
+    assert all(np.isnan(v) for v in perfect_error([]))
 
 
 def test_names_of_the_same_confidence_count_alike_in_whatever_order_they_come() -> None:
