@@ -289,6 +289,9 @@ class Thresholds:
     """Standard errors from which a smaller share is enough: many recordings show a small effect surely."""
     gain_sure: float = 0.03
     """That share."""
+    z_lesser: float = 1.0
+    """Standard errors by which what claims more than a step has to predict better to stand in for one (a slip concealed
+    in a piece of the jaw's `L_4`, seed 136: 22 ahead of none, 0.3 behind broken wires)."""
     z_zero_step: float = 0.0
     """Standard errors by which an event has to predict better than a plain step of the encoder's zero at its instant:
     an event steps the zero too, so the step stands in for it only where it predicts better. A slip while a recording

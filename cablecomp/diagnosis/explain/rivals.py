@@ -55,8 +55,7 @@ class Rivals(NamedTuple):
     models: Mapping[str, Model] = MappingProxyType({})
     """The model with each effect that was tried in its place."""
     lesser: tuple[str, ...] = ()
-    """Those of them that claim more than the term and predict no better: a slip is a plain step of the reading, and an
-    event that does no better than a step stands in for none."""
+    """Those of them that claim more than the term and predict no better (`lesser`)."""
     selected_in: float = 1.0
     """Share of resampled data in which the term is the best of these."""
     any_form: ScoreDifference = ALONE
@@ -127,17 +126,28 @@ def rivals(
     plain = _plain(model, base, term, groups)
     effects = tuple(n for n in kept if n != term.name)
     best = selected_in(losses, rng)
-    stepped = [h.name for h in others if h.has_instant and not h.effect.steps] if term.effect.steps else []
-    lesser = tuple(n for n in stepped if n in differences and differences[n].gain >= -LIMITS.tie)
     return Rivals(
         effects,
         tuple(plain),
         {**differences, **plain},
         models,
-        lesser,
+        lesser(term, others, differences),
         best[term.name],
         score_difference(mine_freely, left_out_with_discrepancy(base, beside, groups), groups),
         min(freely, key=lambda d: d.z, default=NO_RIVAL),
+    )
+
+
+def lesser(
+    term: Hypothesis, others: Sequence[Hypothesis], differences: Mapping[str, ScoreDifference]
+) -> tuple[str, ...]:
+    """Which others claim more than the term and predict no better, or by chance: a slip is a plain step of the reading,
+    and an event that does no clearly better than a step stands in for none. `differences`: the term's against each."""
+    if not term.effect.steps:
+        return ()
+    events = [h.name for h in others if h.has_instant and not h.effect.steps and h.name in differences]
+    return tuple(
+        n for n in events if differences[n].gain >= -LIMITS.tie or differences[n].z > -LIMITS.z_lesser
     )
 
 
