@@ -419,9 +419,10 @@ class Thresholds:
     rival_alone: float = 0.25
     """Share of what an effect takes off alone that such another one has to take off alone (the jaw's `L_4/13`: its path
     alone explains most by far, and in its place another friction takes up what the motor's leaves)."""
-    presliding: float = 0.12
-    """Share of the joint's deflection within which a bearing's friction builds up, at most, where the drive is known
-    (trials seeds 705 to 802: of names with a wider one 14 of 17 were wrong, of narrower ones 18 of 140)."""
+    presliding: tuple[float, float] = (0.004, 0.12)
+    """Share of the joint's deflection within which a bearing's friction builds up, at least and at most, where the
+    drive is known (trials seeds 705 to 802: of names with a wider one 14 of 17 were wrong, of narrower ones 18 of 140;
+    755 to 760 and 819 to 823: below 0.004 10 of 15, of 44 from there on one)."""
     mixed_drag: tuple[float, float] = (0.6, 3.0)
     """What goes with speed of a joint's friction over what does not, at the usual speed, between which it is no name:
     whatever yields late seems to drag in part (trials seeds 738 to 744: five of five such names were wrong, at 0.66 to

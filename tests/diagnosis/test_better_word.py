@@ -196,12 +196,20 @@ def test_a_coefficient_that_grows_by_a_power_and_turns_beyond_a_pressure_is_anot
 
 
 @pytest.mark.parametrize(
-    ("share", "known", "word"), [(0.05, True, ""), (0.2, True, "presliding_rad"), (0.2, False, "")]
+    ("share", "known", "word"),
+    [
+        (0.05, True, ""),
+        (0.2, True, "presliding_rad"),
+        (0.2, False, ""),
+        (0.005, True, ""),
+        (0.003, True, "presliding_rad"),
+        (0.003, False, ""),
+    ],
 )
-def test_friction_that_builds_up_over_much_of_the_deflection_is_no_bearings(
+def test_friction_that_builds_up_over_much_of_the_deflection_or_at_once_is_no_bearings(
     share: float, known: bool, word: str
 ) -> None:
-    """A hysteresis of the drive, where the drive is known."""
+    """A hysteresis of the drive, or what another friction's form leaves at reversals, where the drive is known."""
     law, used = hypothesis("bearing_friction", "bearing_friction"), gathered()
     joint, motor = (used[0].columns[name] for name in ("joint_position_rad", "motor_position_rad"))
     slope, middle = np.polyfit(motor, joint, 1)

@@ -59,8 +59,10 @@ def better_word(fit: Fit, h: Hypothesis) -> str:
         below = p.least_is_another and own[p.name] < p.bounds(fit.problem.config)[0]
         if below or p.is_another(own, h.key(p.name) in on_high):
             return p.name
-        if p.role == "presliding" and own[p.name] > _widest_presliding(fit, h) and not drags(fit, h):
-            return p.name
+        if p.role == "presliding" and not drags(fit, h):
+            least, most = _presliding(fit, h)
+            if own[p.name] > most or 0.0 < own[p.name] < least:
+                return p.name
     return ""
 
 
@@ -85,13 +87,15 @@ def drag_at_speed(fit: Fit, h: Hypothesis) -> float:
     return at_speed * fit.problem.config.drive.ratio * float(np.sqrt(np.nanmean(rates**2)))
 
 
-def _widest_presliding(fit: Fit, h: Hypothesis) -> float:
-    """The turn within which a joint's own friction builds up, at most [rad]: beyond it what gives way is a hysteresis
-    of the drive. No bound beside a drive known by order of magnitude, whose deflection nothing tells from it."""
+def _presliding(fit: Fit, h: Hypothesis) -> tuple[float, float]:
+    """The turn within which a joint's own friction builds up, at least and at most [rad]: beyond it what gives way is a
+    hysteresis of the drive; what leaps at each reversal is what other frictions' forms leave. No bounds beside a drive
+    known by order of magnitude, whose deflection nothing tells from it."""
     if MOTOR in h.effect.needs or vague_drive(fit.problem.parameters):
-        return np.inf
-    seen = [e.deflection_rad for e in fit.problem.evidence if JOINT in e.columns]
-    return LIMITS.presliding * max(seen, default=np.inf)
+        return 0.0, np.inf
+    seen = max((e.deflection_rad for e in fit.problem.evidence if JOINT in e.columns), default=np.inf)
+    least, most = LIMITS.presliding
+    return (least * seen if np.isfinite(seen) else 0.0), most * seen
 
 
 def falls_between(fit: Fit, h: Hypothesis) -> bool:
