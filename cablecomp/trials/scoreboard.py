@@ -162,7 +162,7 @@ def _of_confidence(rows: Sequence[Row], trust: Trust) -> Iterable[Target]:
     error = "confidence: expected calibration error"
     yield Target(error, trust.error, (nan, nan), trust.of, None, 0.05, "1")
     mean, low, high = trust.perfect
-    yield Target("confidence: that of a perfect one, as many effects", mean, (low, high), trust.of, unit="1")
+    yield Target("confidence: error of a perfect one, as many effects", mean, (low, high), trust.of, unit="1")
     area = "confidence: area under risk–coverage, over that of z alone"
     yield Target(area, over, (nan, nan), trust.of, None, 1.0, "1")
     held = rate(z, lambda e: abs(e[0]) <= 1.96)
