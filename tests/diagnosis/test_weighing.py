@@ -64,12 +64,9 @@ def test_what_speaks_against_a_name_is_said_and_nothing_else(
     assert ";" not in reason
 
 
-def _weighed(
-    name: str, removes: float, confidence: float, lead: float = 9.0, last: float | None = None
-) -> Weighed:
+def _weighed(name: str, removes: float, confidence: float) -> Weighed:
     even, effect = ScoreDifference(0.5, 9.0, 9.0), hypothesis(name.partition(":")[0], name)
-    evidence = {"lead": lead, "share_total": removes if last is None else last}
-    return Weighed(effect, None, evidence, confidence, {}, even, "", removes)
+    return Weighed(effect, None, {}, confidence, {}, even, "", removes)
 
 
 @pytest.mark.parametrize(

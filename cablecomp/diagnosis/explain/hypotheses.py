@@ -66,11 +66,6 @@ class Hypothesis:
         return f"effect.{self.effect.id}.{parameter}"
 
     @property
-    def is_delay(self) -> bool:
-        """Whether it is how late a channel is, which has one form."""
-        return self.amount.unit == "s"
-
-    @property
     def has_instant(self) -> bool:
         """Whether it is an event."""
         return self.instant != ""

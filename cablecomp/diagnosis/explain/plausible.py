@@ -93,9 +93,9 @@ def _presliding(fit: Fit, h: Hypothesis) -> tuple[float, float]:
     known by order of magnitude, whose deflection nothing tells from it."""
     if MOTOR in h.effect.needs or vague_drive(fit.problem.parameters):
         return 0.0, np.inf
-    seen = max((e.deflection_rad for e in fit.problem.evidence if JOINT in e.columns), default=np.inf)
+    seen = max((e.deflection_rad for e in fit.problem.evidence if JOINT in e.columns), default=np.nan)
     least, most = LIMITS.presliding
-    return (least * seen if np.isfinite(seen) else 0.0), most * seen
+    return least * seen, most * seen
 
 
 def falls_between(fit: Fit, h: Hypothesis) -> bool:
