@@ -442,6 +442,11 @@ class Thresholds:
     usual_alike: float = 1.0
     """The same of an effect that acts first through what that goes by: another recording of the same machine has more
     or less of it (twins of the jaw's `L_4`, seed 127: gravity took 0.4 and 0.7, of seed 135 more than 1)."""
+    usual_by_angle: int = 8
+    """Knots over the motor's angle of what the joint is known to leave, for each direction, where an event is weighed:
+    what comes again each cycle hides no step."""
+    usual_by_load: int = 6
+    """The same over the load."""
     goes_by: float = 0.5
     """Share of what is left, over that of the covariate that it follows most, from which it is known to go by another
     as well: a joint that swings to and fro has them all alike."""

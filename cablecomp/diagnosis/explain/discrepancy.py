@@ -19,11 +19,12 @@ from cablecomp.diagnosis.explain.events import course_of
 from cablecomp.diagnosis.explain.hypotheses import OF_COURSE, Hypothesis
 from cablecomp.diagnosis.explain.model import Model
 from cablecomp.diagnosis.explain.scores import left_out_linearly, movable
+from cablecomp.diagnosis.explain.usual import usual_of
 from cablecomp.diagnosis.folds import Groups
 from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.effects.catalogue import role_of
 from cablecomp.errors import InputError
-from cablecomp.estimation.evidence import Evidence
+from cablecomp.estimation.evidence import JOINT, Evidence
 from cablecomp.estimation.least_squares import Fit
 from cablecomp.estimation.problem import Problem
 from cablecomp.estimation.simulate import load_of
@@ -37,10 +38,12 @@ def left_out_with_discrepancy(
     *,
     event: Hypothesis | None = None,
     own: Hypothesis | None = None,
+    usual: bool = False,
 ) -> FloatArray:
     """Weighted residual of every data row with its fold left out, where these effects of the model may have other forms
     (an event among them another course), one further `event` of it another course, and what is asked about its `own`
-    form, too; as `left_out` where there is nothing of these."""
+    form, too, and where what the joint is known to leave is let go by what it goes by (`usual`: of an event, which goes
+    by none of that); as `left_out` where there is nothing of these."""
     fit, n = model.fit, len(groups.fold)
     laws = {h.effect.id for h in (*beside, own) if h is not None}
     columns = [
@@ -52,6 +55,8 @@ def left_out_with_discrepancy(
     free = [(c * f, LIMITS.form) for c in columns for f in forms]
     courses = (*((h, LIMITS.course) for h in (*beside, event)), (own, LIMITS.own_course))
     free += [(c, sd) for h, sd in courses if h is not None and h.has_instant for c in _courses(fit, h)]
+    if usual:
+        free += [(c, 1.0) for c in _usual(fit.problem)]
     if not free:
         return model.left_out
     D = np.stack([c for c, _ in free], axis=1)
@@ -79,6 +84,34 @@ def _courses(fit: Fit, event: Hypothesis) -> list[FloatArray]:
     except InputError:
         return []
     return list(from_each(problem, does, does_not, instants_of(problem, LIMITS.steps)).T)
+
+
+def _usual(problem: Problem) -> list[FloatArray]:
+    """What the joint is known to leave of its angle, as curves by what that goes by: hats over the motor's angle and
+    over the load, each direction its own, as high as what it leaves."""
+    height, known = usual_of(problem.config, JOINT), problem.config.remainder.follows
+    by_load, by_angle = "load" in known, bool({"motor_angle", "joint_angle"} & {*known})
+    if JOINT not in problem.channels or not height or not (by_load or by_angle):
+        return []
+    courses = [_course(problem, e) for e in problem.evidence]
+    hats = [np.zeros((c.shape[1], 0)) for c in courses]
+    for count, which, rate in (
+        (LIMITS.usual_by_load * by_load, 0, 3),
+        (LIMITS.usual_by_angle * by_angle, 1, 4),
+    ):
+        every = np.concatenate([c[which] for c in courses])
+        low, high = np.nanmin(every), np.nanmax(every)
+        if count and high > low:
+            at = np.linspace(low, high, count)
+            hats = [np.hstack((h, _hats(c[which], c[rate], at))) for h, c in zip(hats, courses, strict=True)]
+    none = {c: [np.zeros_like(h) for h in hats] for c in problem.channels}
+    return list(problem.rows({**none, JOINT: [height * h for h in hats]}).T)
+
+
+def _hats(x: FloatArray, rate: FloatArray, knots: FloatArray) -> FloatArray:
+    """Piecewise linear hats at these knots, once for each direction (rows x 2 knots)."""
+    hats = np.stack([np.interp(x, knots, one) for one in np.eye(len(knots))], axis=1)
+    return np.hstack((hats * (rate > 0.0)[:, None], hats * (rate <= 0.0)[:, None]))
 
 
 def _law_of(parameter: str) -> str:

@@ -4,6 +4,7 @@ tell apart."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
@@ -89,10 +90,11 @@ def rivals(
     roughs = sorted(
         ((f, a[0]) for f, a in zip(fitted, answers, strict=True) if f is not None), key=lambda p: p[0].cost
     )
-    mine = left_out_with_discrepancy(model, beside, groups)
+    left_by = partial(left_out_with_discrepancy, beside=beside, groups=groups, usual=term.has_instant)
+    mine = left_by(model)
     size = scales(mine, groups)
     losses = {term.name: block_losses(mine, size, groups)}
-    mine_freely = left_out_with_discrepancy(model, beside, groups, own=term)
+    mine_freely = left_by(model, own=term)
     differences: dict[str, ScoreDifference] = {}
     freely: list[ScoreDifference] = []
     models: dict[str, Model] = {}
@@ -107,16 +109,13 @@ def rivals(
         if better_word(other.fit, a.hypothesis):
             other = begun
         models[a.hypothesis.name] = other
-        theirs = left_out_with_discrepancy(other, beside, groups)
+        theirs = left_by(other)
         differences[a.hypothesis.name] = score_difference(mine, theirs, groups)
-        theirs_freely = left_out_with_discrepancy(other, beside, groups, own=a.hypothesis)
+        theirs_freely = left_by(other, own=a.hypothesis)
         freely.append(score_difference(mine_freely, theirs_freely, groups))
         losses[a.hypothesis.name] = block_losses(theirs, size, groups)
         if term.has_instant and a.hypothesis.has_instant:
-            own, its = (
-                left_out_with_discrepancy(m, beside, groups, event=t)
-                for m, t in ((model, term), (other, a.hypothesis))
-            )
+            own, its = left_by(model, event=term), left_by(other, event=a.hypothesis)
             step = score_difference(own, its, groups)
             if step.z > differences[a.hypothesis.name].z:  # told apart where either way tells
                 differences[a.hypothesis.name] = step
@@ -133,7 +132,7 @@ def rivals(
         models,
         lesser(term, others, differences),
         best[term.name],
-        score_difference(mine_freely, left_out_with_discrepancy(base, beside, groups), groups),
+        score_difference(mine_freely, left_by(base), groups),
         min(freely, key=lambda d: d.z, default=NO_RIVAL),
     )
 

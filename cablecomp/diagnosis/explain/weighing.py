@@ -83,7 +83,9 @@ def _weighed(
     own, instead = ALONE, Rivals()
     if bare is not None:
         others = [t for t in bare.terms if isinstance(t, Hypothesis)]
-        having, lacking = (left_out_with_discrepancy(m, others, groups) for m in (final, bare))
+        having, lacking = (
+            left_out_with_discrepancy(m, others, groups, usual=term.has_instant) for m in (final, bare)
+        )
         own = score_difference(having, lacking, groups)
         instead = rivals(final, term, bare, pool, groups, selection.seen.apart(), selection.known, rng)
     against = {name: d for name, d in instead.differences.items() if name not in instead.lesser}
