@@ -444,7 +444,7 @@ class Thresholds:
     or less of it (twins of the jaw's `L_4`, seed 127: gravity took 0.4 and 0.7, of seed 135 more than 1)."""
     usual_by_angle: int = 8
     """Knots over the motor's angle of what the joint is known to leave, for each direction, where an event is weighed:
-    what comes again each cycle hides no step."""
+    what comes again each cycle hides no step (taken beforehand, no other count was tried; jaw, seeds 117 and 118)."""
     usual_by_load: int = 6
     """The same over the load."""
     goes_by: float = 0.5

@@ -89,28 +89,28 @@ def _courses(fit: Fit, event: Hypothesis) -> list[FloatArray]:
 def _usual(problem: Problem) -> list[FloatArray]:
     """What the joint is known to leave of its angle, as curves by what that goes by: hats over the motor's angle and
     over the load, each direction its own, as high as what it leaves."""
-    height, known = usual_of(problem.config, JOINT), problem.config.remainder.follows
-    by_load, by_angle = "load" in known, bool({"motor_angle", "joint_angle"} & {*known})
-    if JOINT not in problem.channels or not height or not (by_load or by_angle):
+    height, follows = usual_of(problem.config, JOINT), set(problem.config.remainder.follows)
+    if JOINT not in problem.channels or not height:
         return []
     courses = [_course(problem, e) for e in problem.evidence]
-    hats = [np.zeros((c.shape[1], 0)) for c in courses]
-    for count, which, rate in (
-        (LIMITS.usual_by_load * by_load, 0, 3),
-        (LIMITS.usual_by_angle * by_angle, 1, 4),
-    ):
-        every = np.concatenate([c[which] for c in courses])
-        low, high = np.nanmin(every), np.nanmax(every)
-        if count and high > low:
-            at = np.linspace(low, high, count)
-            hats = [np.hstack((h, _hats(c[which], c[rate], at))) for h, c in zip(hats, courses, strict=True)]
+    load, angle, _, loading, speed = np.concatenate(courses, axis=1)
+    curves = []
+    if "load" in follows:
+        curves.append(_hats(load, loading, LIMITS.usual_by_load))
+    if follows & {"motor_angle", "joint_angle"}:
+        curves.append(_hats(angle, speed, LIMITS.usual_by_angle))
+    if not curves:
+        return []
+    ends = np.cumsum([c.shape[1] for c in courses])
+    hats = np.split(height * np.hstack(curves), ends[:-1])
     none = {c: [np.zeros_like(h) for h in hats] for c in problem.channels}
-    return list(problem.rows({**none, JOINT: [height * h for h in hats]}).T)
+    return list(problem.rows({**none, JOINT: hats}).T)
 
 
-def _hats(x: FloatArray, rate: FloatArray, knots: FloatArray) -> FloatArray:
-    """Piecewise linear hats at these knots, once for each direction (rows x 2 knots)."""
-    hats = np.stack([np.interp(x, knots, one) for one in np.eye(len(knots))], axis=1)
+def _hats(x: FloatArray, rate: FloatArray, count: int) -> FloatArray:
+    """So many piecewise linear hats over the range of x, once for each direction (rows x 2 count)."""
+    knots = np.linspace(np.nanmin(x), np.nanmax(x), count)
+    hats = np.stack([np.interp(x, knots, one) for one in np.eye(count)], axis=1)
     return np.hstack((hats * (rate > 0.0)[:, None], hats * (rate <= 0.0)[:, None]))
 
 
