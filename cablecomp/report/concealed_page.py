@@ -123,7 +123,7 @@ def found_by_size(answer: Mapping[str, Any]) -> Any:
         across,
         subplot_titles=[c["words"] for c in shown],
         figure=style.figure(
-            drawn_px + 154, margin={"l": 56, "r": 20, "t": 104, "b": 50}, legend={"y": 1.0 + 52 / drawn_px}
+            drawn_px + 154, margin={"l": 56, "r": 44, "t": 104, "b": 50}, legend={"y": 1.0 + 52 / drawn_px}
         ),  # between legend and figure, as between rows, lie two lines of a title
         vertical_spacing=100 / drawn_px,
     )
