@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from cablecomp.config import JointConfig, ratios_to_last
 from cablecomp.mechanics.change import Change
 
-__all__ = ["Change", "Effect", "Parameter", "Role"]
+__all__ = ["Change", "Effect", "Late", "Parameter", "Role"]
 
 Floats = NDArray[np.float64]
 Role = Literal[
@@ -140,6 +140,16 @@ class Parameter:
         return self.low * unit, self.high * unit
 
 
+class Late(NamedTuple):
+    """By how much [s] channels are stamped late against the motor's (negative: early): the joint encoder's, growing by
+    `drift` in a second since `since_s` (NaN: the recording's first sample), and the torque's."""
+
+    joint_s: float
+    drift: float
+    since_s: float
+    load_s: float
+
+
 LEAST_PRETENSION = 0.05
 """Share of T0 below which no law of the pretension is followed further."""
 
@@ -248,6 +258,9 @@ class Effect:
     """Where it has a reference: the same law with this one."""
     steps: bool = False
     """Among its shapes is a plain step of the joint, which a step of the encoder's zero cannot be told from."""
+    late: Callable[[Mapping[str, float]], Late] | None = None
+    """By how much channels come late, where it is nothing else: a recording that is whole is read in time instead of
+    running its term (`estimation/in_time.py`)."""
     tries: tuple[Mapping[str, float], ...] = ()
     """Shapes that a diagnosis leaves out at first and asks for together, in units of their `scale(config)`; with them
     one that has to be given, which is asked for without them as well."""

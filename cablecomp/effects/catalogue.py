@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from cablecomp.config import EffectEntry, JointConfig
-from cablecomp.effects.base import Effect, Parameter, Role
+from cablecomp.effects.base import Effect, Late, Parameter, Role
 from cablecomp.effects.empirical import empirical_term
 from cablecomp.errors import InputError
 from cablecomp.mechanics.change import Change, Term, together
@@ -113,6 +113,19 @@ def extend(config: JointConfig) -> Change | None:
     if config.empirical:
         changes.append(Change(terms=tuple(_empirical(config))))
     return changes[0] if len(changes) == 1 else together(changes)
+
+
+def late_channels(config: JointConfig) -> tuple[JointConfig, tuple[Late, ...]]:
+    """The joint without what merely comes late, and by how much its channels do, one after another; raises as
+    `extend`."""
+    known = [(_look_up(entry.id), entry) for entry in config.effect]
+    late = [(effect.late, _values(effect, e, config)) for effect, e in known if effect.late is not None]
+    if not late:
+        return config, ()
+    others = tuple(entry for effect, entry in known if effect.late is None)
+    found = (told(values) for told, values in late if told is not None)
+    acting = tuple(one for one in found if one.joint_s or one.drift or one.load_s)
+    return config.model_copy(update={"effect": others}), acting
 
 
 def is_bounded(config: JointConfig) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from cablecomp.config import JointConfig
-from cablecomp.effects.base import Change, Effect, Parameter
+from cablecomp.effects.base import Change, Effect, Late, Parameter
 from cablecomp.effects.compiled_term import term
 from cablecomp.effects.shared_shapes import begun
 
@@ -16,31 +16,22 @@ SLOTS = 256
 STEPS_PER_DELAY = 200.0
 LONGEST_S = 1.0
 """What a delay grows to at most, however long a clock drifts."""
-EVENLY = 0.2
-"""Of what the speed changes by from row to row, how far off its mean may be where it bends evenly; twice as far off it
-counts as straight, and in between as partly bent (at a corner it is off by half)."""
-LEAST = 1e-300
-"""So that a speed that does not change at all divides nothing by zero."""
-UNKNOWN = 1e300
-"""A speed that nothing bends evenly with."""
 
 
 @term(
     parameters=("delay", "of_load", "drift", "since"),
-    state=("start", "count", "cursor", "time", "reading", "angle", "rate"),
-    rings=(("times", SLOTS), ("readings", SLOTS), ("angles", SLOTS), ("rates", SLOTS)),
+    state=("start", "count", "cursor", "time", "reading"),
+    rings=(("times", SLOTS), ("readings", SLOTS)),
 )
 def _look_back(c: Any, p: Any, s: Any) -> None:
     """p: delay [s], whether of the deflection alone, by how much it grows in a second, since when [s] (none: with the
     first sample); s: since when, how many readings are kept, number of the last one read, the newest one (its time, the
-    reading, the rigid drive's angle and speed), and in rings those before.
+    reading), and in rings those before.
 
-    Positive delay: straight interpolation of the past, the rigid drive's part of it by a cubic where its speed is known
-    and bends evenly (rows picked from many, some hundredths of a second apart: straight, a twentieth of a short delay
-    was lost); before the first sample, that one. Negative delay: straight on by the mean velocity over a delay's
-    length, which hardly amplifies noise. A torque that is stamped late gives the right tensions late: the deflection is
-    carried on as an early reading is. Were the torque itself carried on, each of its corners would leave a bump that
-    never was.
+    Positive delay: straight interpolation of the past; before the first sample, that one. Negative delay: straight on
+    by the mean velocity over a delay's length, which hardly amplifies noise. A torque that is stamped late gives the
+    right tensions late: the deflection is carried on as an early reading is. Were the torque itself carried on, each of
+    its corners would leave a bump that never was.
     """
     now = c.time
     start = s.start
@@ -53,32 +44,22 @@ def _look_back(c: Any, p: Any, s: Any) -> None:
     count, cursor = int(s.count), int(s.cursor)
     newest = count - 1
     wanted = now - span
-    angles, rates = s.angles, s.rates
-    angle, rate = c.rigid * c.motor, UNKNOWN if math.isnan(c.motor_rate) else c.rigid * c.motor_rate
     past, past_time = value, now
     if count > 0:
         while cursor < newest and (s.time if cursor == newest - 1 else times[(cursor + 1) % SLOTS]) <= wanted:
             cursor += 1
-        past_time, past, past_angle, past_rate = s.time, s.reading, s.angle, s.rate
-        after_time, after, after_angle, after_rate = now, value, angle, rate
+        past_time, past = s.time, s.reading
+        after_time, after = now, value
         if cursor < newest:
             at = cursor % SLOTS
-            past_time, past, past_angle, past_rate = times[at], readings[at], angles[at], rates[at]
-            after_time, after, after_angle, after_rate = s.time, s.reading, s.angle, s.rate
+            past_time, past = times[at], readings[at]
+            after_time, after = s.time, s.reading
             if cursor < newest - 1:
                 at = (cursor + 1) % SLOTS
-                after_time, after, after_angle, after_rate = times[at], readings[at], angles[at], rates[at]
+                after_time, after = times[at], readings[at]
         if past_time < wanted and after_time > past_time:
-            length = after_time - past_time
-            part = (wanted - past_time) / length
-            past += (after - past) * part
+            past += (after - past) * (wanted - past_time) / (after_time - past_time)
             past_time = wanted
-            straight = (after_angle - past_angle) / length
-            begins, ends = past_rate - straight, after_rate - straight
-            even = 2.0 - abs(begins + ends) / (EVENLY * abs(ends - begins) + LEAST)
-            if p.of_load == 0.0 and even > 0.0:
-                bent = length * part * (1.0 - part) * ((1.0 - part) * begins - part * ends)
-                past += min(even, 1.0) * bent
     if delay > 0.0:
         c.reading += past - value
     elif past_time < now:
@@ -89,10 +70,10 @@ def _look_back(c: Any, p: Any, s: Any) -> None:
         if count == 0 or same or now - s.time >= span / STEPS_PER_DELAY:
             if count > 0 and not same:
                 at = newest % SLOTS
-                times[at], readings[at], angles[at], rates[at] = s.time, s.reading, s.angle, s.rate
+                times[at], readings[at] = s.time, s.reading
                 s.cursor = float(cursor)
             s.count = float(count if same else count + 1)
-            s.time, s.reading, s.angle, s.rate = now, value, angle, rate
+            s.time, s.reading = now, value
 
 
 def _change(values: Mapping[str, float], config: JointConfig) -> Change:
@@ -103,14 +84,18 @@ def _change(values: Mapping[str, float], config: JointConfig) -> Change:
     return Change(terms=(*(load if values["load_delay_s"] else ()), *(joint if late else ())))
 
 
+def _late(values: Mapping[str, float]) -> Late:
+    return Late(values["delay_s"], values["drift"], values["drift_since_s"], values["load_delay_s"])
+
+
 EFFECT = Effect(
     id="clock_skew",
     statement="Channels are stamped late against each other, or filtered: what the joint encoder or the torque sensor "
     "reads now was true a moment ago; where two clocks run at unlike speed, ever longer ago.",
     equation="joint(t) = joint_true(t - Δ - ρ (t - t0)), M(t) = M_true(t - Δ_M); t0 the recording's first sample "
     "unless it is given (clocks that go on from recording to recording)",
-    source="pure delay between channels; a negative one is met by extrapolation along the last Δ; crystals of loggers "
-    "are off by 10 to 50 in a million",
+    source="pure delay between channels; live, a negative one (and a late torque) is met by extrapolation along the "
+    "last Δ, in a recording that is whole by what was read later; crystals of loggers are off by 10 to 50 in a million",
     parameters=(
         Parameter(
             "delay_s",
@@ -151,5 +136,6 @@ EFFECT = Effect(
     acts_through=("velocity", "load_rate"),
     bounded=False,
     change=_change,
+    late=_late,
     rank=100,
 )

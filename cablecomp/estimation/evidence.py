@@ -15,7 +15,7 @@ import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.observer.rows import Readings
-from cablecomp.signal.smoothing import BoolArray, FloatArray, IntArray
+from cablecomp.signal.smoothing import BoolArray, FloatArray, IntArray, rate_of
 
 JOINT: Final = "joint_position_rad"
 INPUT: Final = "motor_position_rad"
@@ -67,7 +67,6 @@ class Evidence:
     noise: Mapping[str, float] = field(default_factory=dict)
     outliers: int = 0
     samples: int = 0
-    step_s: float = 0.0
     shift_s: float = 0.0
     carryover: Mapping[str, FloatArray] = field(default_factory=dict)
     hidden: tuple[int, ...] = ()
@@ -89,9 +88,7 @@ class Evidence:
     @cached_property
     def motor_rate(self) -> FloatArray:
         """Speed of the motor on the fine rows [rad/s]; NaN where two of them have one time."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            rate = np.gradient(self.columns[INPUT], self.columns["time_s"])
-        return np.asarray(np.where(np.isfinite(rate), rate, np.nan), dtype=np.float64)
+        return rate_of(self.columns[INPUT], self.columns["time_s"])
 
     @cached_property
     def readings(self) -> dict[tuple[bytes, tuple[str, ...]], Readings]:

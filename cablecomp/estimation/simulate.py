@@ -10,9 +10,11 @@ import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.effects import extend
-from cablecomp.effects.catalogue import other_channels
+from cablecomp.effects.base import Late
+from cablecomp.effects.catalogue import late_channels, other_channels
 from cablecomp.errors import InputError, SlackError
 from cablecomp.estimation.evidence import JOINT, MOTOR, Evidence, load_channel
+from cablecomp.estimation.in_time import joint_as_stamped, with_felt_loads
 from cablecomp.mechanics.assemble import Model, assemble
 from cablecomp.mechanics.change import Change, together
 from cablecomp.mechanics.start import joint_start
@@ -44,12 +46,18 @@ class Unrecorded(NamedTuple):
 
 @dataclass(frozen=True)
 class Simulator:
-    """A joint set up once, good for every recording in which it stands alike."""
+    """A joint set up once, good for every recording in which it stands alike.
+
+    `model`: without what merely comes `late`; `lawless`: the same without laws that have no name, where it has some and
+    something is late: these go by what was read, and when.
+    """
 
     joint: JointConfig
     model: Model
     others: tuple[str, ...]
     fine: bool
+    late: tuple[Late, ...] = ()
+    lawless: Model | None = None
 
     def predict(self, recording: Evidence, unrecorded: Unrecorded | None = None) -> dict[str, FloatArray]:
         """Every output channel [rad, N m, N] on the recording's judged rows, encoder zeros not added; `unrecorded`:
@@ -63,13 +71,35 @@ class Simulator:
         return {name: getattr(answer, field)[judged] for name, field in _ANSWERS.items()}
 
     def run(self, recording: Evidence, kept: IntArray, unrecorded: Unrecorded | None = None) -> Answer:
-        """The kernel's answers on the fine rows `kept`."""
+        """The kernel's answers on the fine rows `kept`, their channels as late as they are stamped."""
         read = self._known_readings(recording, kept)
+        late_s, load = sum(one.load_s for one in self.late), load_of(self.joint, recording.columns)
+        own = None
+        if late_s and not isinstance(load, float):
+            read, own = with_felt_loads(read, recording, load, late_s)
+        answer = self._step(self.model, recording, read, unrecorded)
+        joint = answer.joint
+        if any(one.joint_s or one.drift for one in self.late):
+            plain = joint
+            if self.lawless is not None:
+                plain = self._step(self.lawless, recording, read, unrecorded).joint
+            late = joint_as_stamped(plain, read.time, recording, self.late, self.joint.drive.ratio)
+            joint = late + (joint - plain)
+        answer = answer._replace(joint=joint)
+        return answer if own is None else Answer(*(column[own] for column in answer))
+
+    def _step(
+        self, model: Model, recording: Evidence, read: Readings, unrecorded: Unrecorded | None
+    ) -> Answer:
+        """The kernel's answers to these readings."""
         place, more = 0, 0
         if unrecorded is not None:
-            place, more = int(np.searchsorted(kept, unrecorded.after, side="right")), len(unrecorded.path)
+            if unrecorded.after >= 0:
+                place = int(
+                    np.searchsorted(read.time, recording.columns["time_s"][unrecorded.after], "right")
+                )
+            more = len(unrecorded.path)
             read = _with_unrecorded(read, place, unrecorded.path)
-        model = self.model
         memory, heights = model.memory.copy(), model.heights.copy()
         joint_start(model.fixed, model.layout, memory, heights, model.laws, read.time[0], read.motor[0], 0.0)
         outs, answer = answers(len(read.rows))
@@ -145,5 +175,15 @@ def load_of(joint: JointConfig, columns: Mapping[str, FloatArray]) -> FloatArray
 def simulator(joint: JointConfig, fine: bool = False, beside: Change | None = None) -> Simulator:
     """Set the joint up, to run on judged rows or on all fine ones, with a change beside its own effects; raises
     InputError for values that its laws cannot take."""
-    change = together([c for c in (extend(joint), beside) if c is not None]) if beside else extend(joint)
-    return Simulator(joint, assemble(joint, change), tuple(other_channels(joint)), fine)
+    in_time, late = late_channels(joint)
+    model = _assembled(in_time, beside)
+    laws = late and joint.empirical
+    lawless = _assembled(in_time.model_copy(update={"empirical": ()}), beside) if laws else None
+    return Simulator(joint, model, tuple(other_channels(joint)), fine, late, lawless)
+
+
+def _assembled(joint: JointConfig, beside: Change | None) -> Model:
+    change = extend(joint)
+    if beside is not None:
+        change = beside if change is None else together([change, beside])
+    return assemble(joint, change)

@@ -13,6 +13,8 @@ from cablecomp.signal.smoothing import FloatArray, IntArray
 APART: Final = 3.0
 """Times the usual span of the readings that make a fine row up to which they lie: what lies further apart lies on both
 sides of a gap."""
+TURN: Final = 0.02
+"""Share of its range by which a driver has to go back to have turned round."""
 
 
 def thinned(time: FloatArray, drivers: Sequence[FloatArray], joint: FloatArray, count: int) -> IntArray:
@@ -36,7 +38,7 @@ def thinned(time: FloatArray, drivers: Sequence[FloatArray], joint: FloatArray, 
         np.array([0, n - 1]),
         gaps,
         gaps + 1,
-        *(_turns(d, 0.02 * float(np.ptp(d))) for d in drivers),
+        *(turns(d, TURN * float(np.ptp(d))) for d in drivers),
     ]
     return np.unique(np.clip(np.concatenate(kept), 0, n - 1)).astype(np.int64)
 
@@ -48,7 +50,7 @@ def gaps_of(time: FloatArray) -> IntArray:
 
 
 @njit
-def _turns(values: FloatArray, least: float) -> IntArray:
+def turns(values: FloatArray, least: float) -> IntArray:
     """Indices at which the channel turned round by more than `least`."""
     found = np.zeros(len(values), dtype=np.int64)
     count, extreme, sign = 0, 0, 0.0

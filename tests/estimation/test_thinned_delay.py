@@ -41,6 +41,8 @@ def test_what_goes_with_speed_is_between_thinned_rows_what_it_is_between_all(
     size = float(np.sqrt(np.mean(true**2)))
     off = float(np.sqrt(np.mean((shift(e, effect, values, every=False) - true) ** 2)))
     assert off < 0.03 * size
+    if effect == "clock_skew":
+        return  # its readings are those of all fine rows
     unknown = replace(e)
     unknown.__dict__["motor_rate"] = np.full(len(e.columns["time_s"]), np.nan)
     straight = float(np.sqrt(np.mean((shift(unknown, effect, values, every=False) - true) ** 2)))

@@ -21,7 +21,7 @@ from cablecomp.diagnosis.answer.entries import (
     tied_of,
     traces,
 )
-from cablecomp.diagnosis.answer.notes import by_the_clock, notes
+from cablecomp.diagnosis.answer.notes import by_the_clock, carried_on, notes
 from cablecomp.diagnosis.answer.values import as_trials_say, drive_values
 from cablecomp.diagnosis.answer.verdict import not_alike, not_carried, warnings_of
 from cablecomp.diagnosis.calibration.drive import own_in_vain
@@ -70,7 +70,7 @@ def diagnosis_of(
         remainder=remainder(case, outcome, rng),
         remainder_location=outcome.remainder.location,
         tested=tested(found.selection, outcome.told),
-        notes=(*notes(case), *by_the_clock(kept), *alike),
+        notes=(*notes(case), *by_the_clock(kept), *carried_on(kept), *alike),
         augmented_joint=_augmented(case, outcome),
         evidence=drive.fit.problem.evidence,
         traces=tuple(traces(drive.fit, kept.fit, case.covariates, outcome.empirical)),

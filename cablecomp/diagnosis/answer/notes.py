@@ -13,8 +13,10 @@ from cablecomp.diagnosis.explain.turned import stands_still
 from cablecomp.diagnosis.explain.usual import usual_of
 from cablecomp.diagnosis.outcome import Case
 from cablecomp.diagnosis.thresholds import LIMITS
+from cablecomp.effects.catalogue import late_channels
 from cablecomp.estimation.evidence import JOINT, MOTOR, load_channel
 from cablecomp.recording.replay import required_channels
+from cablecomp.signal.smoothing import step_s
 
 SAID = 4
 """Recordings that a note names, or tells the clock of; of more, it says how many."""
@@ -110,3 +112,17 @@ def by_the_clock(model: Model) -> tuple[str, ...]:
             f"up, `{term.of_cycle[0]} = 0` and `{term.amount.name} = {amount * always:.3g}`"
         )
     return tuple(found)
+
+
+def carried_on(model: Model) -> tuple[str, ...]:
+    """What errors are with, and a joint that runs is without: readings that came later."""
+    fit = model.fit
+    first = fit.problem.evidence[0]
+    _, late = late_channels(fit.problem.joint(fit.x, first))
+    ahead_s = max((max(one.load_s, -one.joint_s) for one in late), default=0.0)
+    if ahead_s <= step_s(first.columns["time_s"]):
+        return ()
+    return (
+        f"what is stamped up to {1e3 * ahead_s:.3g} ms late was read in time, as a whole recording allows, and errors "
+        "are so; live and in `replay` the joint is carried straight on over that time, and more is left at corners",
+    )

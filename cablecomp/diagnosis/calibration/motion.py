@@ -74,7 +74,6 @@ def _expected(
         {JOINT: np.ones(len(rows), dtype=np.bool_)},
         np.ones(len(rows)),
         samples=len(rows),
-        step_s=1.0 / RATE_HZ,
     )
     try:
         problem = Problem(plain, of_drive(plain), (e,), Weighing({JOINT: noise_rad}, {JOINT: 0.0}))
