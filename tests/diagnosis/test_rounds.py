@@ -50,8 +50,10 @@ def test_what_trades_places_with_a_drive_that_is_not_known_is_tried_beside_what_
     ]
     at = beginning(sessions, trades=lambda h: h.trades)
     at.groups = SimpleNamespace(by="block")
-    rounds._begun(at, answers)
+    worth, others = rounds._worth(at, answers)
+    rounds._begun(at, worth)
     assert sorted(tried) == [*plain[: LIMITS.tried_later], *trading[:further]]
+    assert [a[0].hypothesis.name for a in others] == [*plain[LIMITS.tried_later :], *trading[further:]]
 
 
 @pytest.mark.parametrize(("number", "kept"), [(0, ["coat"]), (1, [])])
@@ -74,7 +76,7 @@ def test_what_alone_leaves_what_is_plausible_is_no_answer_and_is_kept_apart(
         model=SimpleNamespace(terms=()),
     )  # fmt: skip
     begun: Any = [SimpleNamespace(terms=(h,), problem=None, x=None, J=None) for h in (coat, path)]
-    split: Any = rounds._tried(begun, at, None, np.random.default_rng(0))
+    split: Any = rounds._tried(rounds._ended(begun, at, None), at, None, np.random.default_rng(0))
     assert [[m.name for m in models] for models in split] == [["path"], kept]
 
 
@@ -169,6 +171,37 @@ def test_a_share_with_a_bound_is_begun_with_most_of_it_as_well(effect: str, shar
         assert values[h.key(amount.name)] == pytest.approx(share)
 
 
+@pytest.mark.parametrize(("number", "tried_too"), [(0, []), (1, ["third", "fourth"])])
+def test_what_is_no_answer_takes_nobodys_place_in_a_later_round(
+    number: int, tried_too: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two delays beyond what is plausible had kept a clearance from being tried on a sheath."""
+    begun = [SimpleNamespace(name=n, cost=50.0) for n in ("delay", "drift", "friction")]
+    compared: list[str] = []
+
+    def ended(chosen: Any, *_: Any) -> list[Any]:
+        return [None if c.name in ("delay", "drift") else c.name for c in chosen]
+
+    def tried(found: list[Any], *_: Any) -> tuple[list[Any], list[Any]]:
+        compared.extend(name for name in found if name is not None)
+        return [
+            SimpleNamespace(difference=ScoreDifference(0.3, 9.0, 9.0), term=n, model=n) for n in compared
+        ], []
+
+    monkeypatch.setattr(rounds, "_asked", lambda at: [])
+    monkeypatch.setattr(rounds, "_worth", lambda at, answers: ([], ["third", "fourth", "fifth"]))
+    monkeypatch.setattr(rounds, "_begun", lambda at, worth: (begun, []))
+    monkeypatch.setattr(rounds, "_chosen", lambda first, second, at: first)
+    monkeypatch.setattr(
+        rounds, "_rough", lambda at, others: ([SimpleNamespace(name=n, cost=60.0) for n in others], [])
+    )
+    monkeypatch.setattr(rounds, "_ended", ended)
+    monkeypatch.setattr(rounds, "_tried", tried)
+    at: Any = SimpleNamespace(model="before", number=number, cost=100.0)
+    rounds.one_round(at, np.random.default_rng(0))
+    assert compared == ["friction", *tried_too]
+
+
 @pytest.mark.parametrize(("z", "both"), [(0.0, True), (4.0, True), (6.0, False)])
 def test_an_effect_with_pretensions_of_each_sessions_own_is_tried_beside_what_hardly_helps_alone(
     z: float, both: bool, monkeypatch: pytest.MonkeyPatch
@@ -181,11 +214,13 @@ def test_an_effect_with_pretensions_of_each_sessions_own_is_tried_beside_what_ha
 
     for name, answer in {
         "_asked": [],
+        "_worth": ([], []),
         "_begun": ([], []),
         "_chosen": ["alone"],
         "_pairs": ["together"],
     }.items():
         monkeypatch.setattr(rounds, name, lambda *_, answer=answer: answer)
+    monkeypatch.setattr(rounds, "_ended", lambda chosen, *_: list(chosen))
     monkeypatch.setattr(rounds, "_tried", tried)
     at: Any = SimpleNamespace(model="before", number=1)
     found = rounds.one_round(at, np.random.default_rng(0))

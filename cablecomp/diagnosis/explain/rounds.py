@@ -55,10 +55,16 @@ def one_round(at: Beginning, rng: np.random.Generator) -> Round:
     if fine is not None:
         there = [anchor(fine.fit)]
         answers = [(ask_all(there, a[0].hypothesis) or a) if _wants_rates(a[0], at) else a for a in answers]
-    begun = _begun(at, answers)
-    tried, away = _tried(_chosen(*begun, at), at, fine, rng)
+    worth, others = _worth(at, answers)
+    begun = _begun(at, worth)
+    found = _ended(_chosen(*begun, at), at, fine)
+    refused = sum(m is None for m in found)
+    if at.number > 0 and refused and others:  # what is no answer takes nobody's place
+        more, _ = _rough(at, others[:refused])
+        found += _ended([c for c in more if c.cost < at.cost], at, fine)
+    tried, away = _tried(found, at, fine, rng)
     if not any(t.difference.z > LIMITS.z_sure for t in _good(tried, at)):
-        pairs, _ = _tried(_pairs(begun[0], at), at, fine, rng)
+        pairs, _ = _tried(_ended(_pairs(begun[0], at), at, fine), at, fine, rng)
         tried = sorted([*tried, *pairs], key=lambda t: -t.difference.gain)
     good = _good(tried, at)
     return Round(at.model, tuple(tried), good[0] if good else None, tuple(away))
@@ -69,17 +75,21 @@ def _good(tried: Sequence[Tried], at: Beginning) -> list[Tried]:
     return [t for t in tried if demanded(t.difference, first=at.number == 0)]
 
 
-def _tried(
-    chosen: Sequence[Begun], at: Beginning, fine: Model | None, rng: np.random.Generator
-) -> tuple[list[Tried], list[Model]]:
-    """What is chosen fitted to the end and compared with the model, and what has run away; once the time is up the
-    first alone."""
+def _ended(chosen: Sequence[Begun], at: Beginning, fine: Model | None) -> list[Model | None]:
+    """What is chosen fitted to the end, None for what is no answer; once the time is up the first alone."""
 
     def finish(c: Begun) -> Model | None:
         at.tell(f"fitting {c.terms[0].name}")
         return None if at.pace.over and c is not chosen[0] else _finished(c, at, fine)
 
-    found = [m for m in in_processes(finish, chosen) if m is not None]
+    return list(in_processes(finish, chosen))
+
+
+def _tried(
+    ended: Sequence[Model | None], at: Beginning, fine: Model | None, rng: np.random.Generator
+) -> tuple[list[Tried], list[Model]]:
+    """What has ended compared with the model; and what has run away."""
+    found = [m for m in ended if m is not None]
     models = ranked_models([m for m in found if not _away(m, at)], at.groups)
     return _compared(models, at, fine, rng), [m for m in found if _away(m, at)]
 
@@ -136,17 +146,36 @@ def _dear(h: Hypothesis) -> float:
     return 2.0 * h.effect.rates + h.has_instant
 
 
-def _begun(at: Beginning, answers: Sequence[list[Answer]]) -> tuple[list[Begun], list[Begun]]:
+def _worth(at: Beginning, answers: Sequence[list[Answer]]) -> tuple[list[list[Answer]], list[list[Answer]]]:
+    """The answers that are tried, and those that come next, best first in a later round."""
+    model = at.model
+    worth = [a for a in answers if a[0].cost < LIMITS.promise * at.cost or at.trades(a[0].hypothesis)]
+    if at.number == 0:
+        return worth, []
+    dear = 2 if model.fit.problem.fine else 1
+    worth = sorted(worth, key=lambda a: a[0].cost)
+    most = LIMITS.tried_later // dear
+    trading = LIMITS.tried_trading // dear if len(model.fit.problem.repeated) > 1 else 0
+    traded = [a for a in worth[most:] if at.trades(a[0].hypothesis)][:trading]
+    return worth[:most] + traded, [a for a in worth[most:] if not any(a is t for t in traded)]
+
+
+def _begun(at: Beginning, worth: Sequence[list[Answer]]) -> tuple[list[Begun], list[Begun]]:
     """Rough fits of what promises anything, dependences among them, best first; and the second valleys of effects that
     trade places."""
     model = at.model
-    worth = [a for a in answers if a[0].cost < LIMITS.promise * at.cost or at.trades(a[0].hypothesis)]
-    if at.number > 0:
-        dear = 2 if model.fit.problem.fine else 1
-        worth = sorted(worth, key=lambda a: a[0].cost)
-        most = LIMITS.tried_later // dear
-        trading = LIMITS.tried_trading // dear if len(model.fit.problem.repeated) > 1 else 0
-        worth = worth[:most] + [a for a in worth[most:] if at.trades(a[0].hypothesis)][:trading]
+    first, second = _rough(at, worth)
+    if first and first[0].problem.evidence[0].condition:
+        for found in in_processes(_by_conditions, list(first)):
+            first += found
+    if at.number > 0 or model.fit.problem.parameters:
+        for d, cost, problem in ask_dependences(model.fit, model.terms, at.groups.by):
+            first.append(Begun(cost, (d,), problem, placed(model.fit, problem)))
+    return sorted(first, key=lambda c: c.cost), second
+
+
+def _rough(at: Beginning, worth: Sequence[list[Answer]]) -> tuple[list[Begun], list[Begun]]:
+    """Rough fits of these answers; and of the second valleys of effects that trade places."""
 
     def begin(a: list[Answer]) -> list[Fit]:
         h = a[0].hypothesis
@@ -160,13 +189,7 @@ def _begun(at: Beginning, answers: Sequence[list[Answer]]) -> tuple[list[Begun],
         h = a[0].hypothesis
         for k, f in enumerate(fits[: 2 if at.trades(h) else 1]):
             (second if k else first).append(Begun(f.cost, (h,), f.problem, f.x, f.J))
-    if first and first[0].problem.evidence[0].condition:
-        for found in in_processes(_by_conditions, list(first)):
-            first += found
-    if at.number > 0 or model.fit.problem.parameters:
-        for d, cost, problem in ask_dependences(model.fit, model.terms, at.groups.by):
-            first.append(Begun(cost, (d,), problem, placed(model.fit, problem)))
-    return sorted(first, key=lambda c: c.cost), second
+    return first, second
 
 
 def _chosen(first: Sequence[Begun], second: Sequence[Begun], at: Beginning) -> list[Begun]:

@@ -121,9 +121,10 @@ def _shaped(here: Anchor, h: Hypothesis, best: Best) -> Answer | None:
         return None
     other = promised[0]
     # what an event promises may be out of reach of its fit, which then decides between the shapes; of what goes far
-    # beyond a straight line no promise decides
+    # beyond a straight line, or beside a drive known by order of magnitude, no promise decides
     enough = other.cost < best.cost if h.has_instant else worth_a_shape(other.by_channel, best.by_channel)
-    if not (enough or h.effect.saturates):
+    vague = any(p.vague for p in here.fit.problem.parameters)
+    if not (enough or h.effect.saturates or (vague and not h.has_instant)):
         return None
     near = [f for f in promised[1:2] if not h.has_instant and f.cost < LIMITS.another_shape * other.cost]
     return replace(_answer(here, h, other), next=_answer(here, h, near[0]) if near else None)
