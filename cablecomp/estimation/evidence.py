@@ -15,7 +15,8 @@ import numpy as np
 
 from cablecomp.config import JointConfig
 from cablecomp.observer.rows import Readings
-from cablecomp.signal.smoothing import BoolArray, FloatArray, IntArray, rate_of
+from cablecomp.signal.between import rate_of
+from cablecomp.signal.smoothing import BoolArray, FloatArray, IntArray
 
 JOINT: Final = "joint_position_rad"
 INPUT: Final = "motor_position_rad"
@@ -89,6 +90,11 @@ class Evidence:
     def motor_rate(self) -> FloatArray:
         """Speed of the motor on the fine rows [rad/s]; NaN where two of them have one time."""
         return rate_of(self.columns[INPUT], self.columns["time_s"])
+
+    @cached_property
+    def load_rates(self) -> dict[str, tuple[FloatArray, FloatArray]]:
+        """How fast the channels change on fine rows that a load is read from, and when they turn (`in_time.py`)."""
+        return {}
 
     @cached_property
     def readings(self) -> dict[tuple[bytes, tuple[str, ...]], Readings]:

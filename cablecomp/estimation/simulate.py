@@ -73,10 +73,11 @@ class Simulator:
     def run(self, recording: Evidence, kept: IntArray, unrecorded: Unrecorded | None = None) -> Answer:
         """The kernel's answers on the fine rows `kept`, their channels as late as they are stamped."""
         read = self._known_readings(recording, kept)
-        late_s, load = sum(one.load_s for one in self.late), load_of(self.joint, recording.columns)
+        late_s, channel = sum(one.load_s for one in self.late), load_channel(self.joint, recording.columns)
         own = None
-        if late_s and not isinstance(load, float):
-            read, own = with_felt_loads(read, recording, load, late_s)
+        if late_s and channel is not None:
+            load = np.asarray(load_of(self.joint, recording.columns))
+            read, own = with_felt_loads(read, recording, channel, load, late_s)
         answer = self._step(self.model, recording, read, unrecorded)
         joint = answer.joint
         if any(one.joint_s or one.drift for one in self.late):

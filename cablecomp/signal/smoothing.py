@@ -274,12 +274,3 @@ def _tricube(time_s: FloatArray, values: FloatArray, bounds: IntArray, widths: F
             if det > 1e-9 * s0 * s0 * s0:
                 out[i] = (c00 * y0 + c01 * y1 + c02 * y2) / det
     return out
-
-
-def rate_of(values: FloatArray, time: FloatArray) -> FloatArray:
-    """By how much values change in a second; NaN where two of them have one time, or there is but one."""
-    if len(values) < 2:
-        return np.full(len(values), np.nan)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        rate = np.gradient(values, time)
-    return np.asarray(np.where(np.isfinite(rate), rate, np.nan), dtype=np.float64)

@@ -10,10 +10,10 @@ from cablecomp.config import Empirical, JointConfig
 from cablecomp.effects import with_effects
 from cablecomp.estimation.evidence import Evidence
 from cablecomp.estimation.gather import gather
-from cablecomp.estimation.in_time import read_at
 from cablecomp.estimation.simulate import simulator
 from cablecomp.observer import Observer
-from cablecomp.signal.smoothing import FloatArray, rate_of
+from cablecomp.signal.between import rate_of, read_at
+from cablecomp.signal.smoothing import FloatArray
 
 TIME = np.arange(0.0, 20.0, 0.004)
 RIPPLE = Empirical(
