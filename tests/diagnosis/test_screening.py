@@ -120,6 +120,22 @@ def test_a_gap_that_closes_within_a_narrow_moment_is_told_from_one_that_closes_a
     assert shaped.values["effect.termination_backlash.closes_Nm"] == pytest.approx(0.03, rel=0.25)
 
 
+@pytest.mark.parametrize("vague", [False, True])
+def test_beside_a_drive_known_by_order_of_magnitude_a_shape_is_fitted_whatever_it_promises(
+    vague: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A clearance crossed at finite speed promised 3 % beside a sheath's friction, and took off 37 %."""
+    monkeypatch.setattr(screening, "worth_a_shape", lambda *_: False)
+    body, drive = calibrated(recorded([EffectSpec("termination_backlash", {"gap_rad": 1e-3})], 12.0))
+    problem = drive.fit.problem
+    known = tuple(replace(p, sd=3.0 if vague else 0.1) for p in problem.parameters)
+    fit = replace(drive.fit, problem=replace(problem, parameters=known))
+    (gap,) = (h for h in hypotheses(TOLERANT, body.used) if h.name == "termination_backlash")
+    answer = ask(anchor(fit), gap)
+    assert answer is not None
+    assert (answer.plain is not None) is vague
+
+
 def test_an_event_of_a_law_that_knows_no_duration_is_asked_at_once_alone() -> None:
     """A user's own event may have an instant and nothing of a course."""
     body, drive = calibrated(recorded([EffectSpec("clamp_slip", {"slip_m": 1e-4, "time_s": EVENT_S})], 20.0))

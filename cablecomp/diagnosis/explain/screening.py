@@ -32,6 +32,7 @@ from cablecomp.diagnosis.thresholds import LIMITS
 from cablecomp.errors import InputError
 from cablecomp.estimation.least_squares import Fit, approach, inside
 from cablecomp.estimation.multi_start import lowest, multi_start
+from cablecomp.estimation.parameter import vague_drive
 from cablecomp.estimation.problem import Problem
 from cablecomp.signal.smoothing import FloatArray
 
@@ -123,7 +124,7 @@ def _shaped(here: Anchor, h: Hypothesis, best: Best) -> Answer | None:
     # what an event promises may be out of reach of its fit, which then decides between the shapes; of what goes far
     # beyond a straight line, or beside a drive known by order of magnitude, no promise decides
     enough = other.cost < best.cost if h.has_instant else worth_a_shape(other.by_channel, best.by_channel)
-    vague = any(p.vague for p in here.fit.problem.parameters)
+    vague = vague_drive(here.fit.problem.parameters)
     if not (enough or h.effect.saturates or (vague and not h.has_instant)):
         return None
     near = [f for f in promised[1:2] if not h.has_instant and f.cost < LIMITS.another_shape * other.cost]
