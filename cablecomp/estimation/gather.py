@@ -74,7 +74,7 @@ def gather(
     weight = _weight(means["time_s"], rows)
     return Evidence(
         name, session, {}, means, rows, {k: v[rows] for k, v in read.items()}, weight, noise, set_aside,
-        len(raw["time_s"]), float(np.median(np.diff(raw["time_s"]))), unread=unread, read=read,
+        len(raw["time_s"]), unread=unread, read=read,
     )  # fmt: skip
 
 
