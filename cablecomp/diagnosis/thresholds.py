@@ -279,6 +279,10 @@ class Thresholds:
     took 0.07)."""
     z: float = 2.5
     """The same for every further effect: one in 160 by chance, about twenty asked."""
+    gain_much: float = 0.3
+    """Share of what is left from which a further effect enters as the first does, at `z_first` (trials 825, looked at:
+    both of 3 pairs of 4 for 1; 762 and 983: nothing changed; no wrong name more in any; a clearance of a sheath's stood
+    2.46 out with 0.39)."""
     gain: float = 0.06
     """Share of the held-out square of what is left that an effect must take off to be looked at as a name:
     below it, laws of another form and calibration trade places."""

@@ -150,6 +150,24 @@ def test_chance_does_not_lead_far() -> None:
     assert far <= 6
 
 
+@pytest.mark.parametrize(
+    ("gain", "z", "first", "enters"),
+    [
+        (0.1, 2.6, False, True),
+        (0.1, 2.4, False, False),
+        (0.39, 2.46, False, True),  # a clearance of a sheath's, beside its friction
+        (0.39, 1.6, False, False),
+        (0.04, 6.0, False, True),
+        (0.2, 1.2, True, True),
+        (0.2, 1.2, False, False),
+    ],
+)
+def test_what_takes_off_much_need_not_stand_out_as_far(
+    gain: float, z: float, first: bool, enters: bool
+) -> None:
+    assert scores.demanded(scores.ScoreDifference(gain, z, z), first) is enters
+
+
 def test_what_an_outlier_adds_grows_no_faster_than_itself() -> None:
     """Huber: ten times as far off counts ten times, not a hundred times."""
     near, far = huber(np.array([50.0, 500.0]))

@@ -210,7 +210,8 @@ def demanded(step: ScoreDifference, first: bool = False) -> bool:
     """Whether data left out demand what differences so; `first`: the first effect of all."""
     usual = step.z > (LIMITS.z_first if first else LIMITS.z) and step.gain > LIMITS.gain
     large = first and step.z > LIMITS.z_large and step.gain > LIMITS.gain_large
-    return usual or large or (step.z > LIMITS.z_sure and step.gain > LIMITS.gain_sure)
+    much = step.z > LIMITS.z_first and step.gain > LIMITS.gain_much
+    return usual or large or much or (step.z > LIMITS.z_sure and step.gain > LIMITS.gain_sure)
 
 
 def selected_in(losses: Mapping[str, FloatArray], rng: np.random.Generator) -> dict[str, float]:
