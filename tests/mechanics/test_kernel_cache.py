@@ -17,8 +17,8 @@ from cablecomp.effects.clock_skew import _look_back as look_back
 from cablecomp.effects.compiled_term import CompiledTerm
 from cablecomp.mechanics.jit import CACHE, cached, drop_cut_short
 
-STATE = ("start", "count", "cursor", "time", "reading", "angle", "rate")
-RINGS = tuple((name, SLOTS) for name in ("times", "readings", "angles", "rates"))
+STATE = ("start", "count", "cursor", "time", "reading")
+RINGS = tuple((name, SLOTS) for name in ("times", "readings"))
 
 MODULE = """
 from cablecomp.mechanics.jit import njit
