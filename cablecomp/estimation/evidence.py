@@ -7,7 +7,7 @@ keep a row per so much time. `gather` makes one of a recording's columns.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
 from typing import Final, NamedTuple
 
@@ -65,6 +65,7 @@ class Evidence:
     rows: IntArray
     counted: Mapping[str, BoolArray]
     weight: FloatArray
+    _: KW_ONLY
     noise: Mapping[str, float] = field(default_factory=dict)
     outliers: int = 0
     samples: int = 0

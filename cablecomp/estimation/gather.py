@@ -73,8 +73,8 @@ def gather(
     rows = thinned(means["time_s"], drivers, means[JOINT], judged_rows)
     weight = _weight(means["time_s"], rows)
     return Evidence(
-        name, session, {}, means, rows, {k: v[rows] for k, v in read.items()}, weight, noise, set_aside,
-        len(raw["time_s"]), unread=unread, read=read,
+        name, session, {}, means, rows, {k: v[rows] for k, v in read.items()}, weight, noise=noise,
+        outliers=set_aside, samples=len(raw["time_s"]), unread=unread, read=read,
     )  # fmt: skip
 
 
