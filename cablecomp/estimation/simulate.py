@@ -79,14 +79,12 @@ class Simulator:
             load = np.asarray(load_of(self.joint, recording.columns))
             read, own = with_felt_loads(read, recording, channel, load, late_s)
         answer = self._step(self.model, recording, read, unrecorded)
-        joint = answer.joint
         if any(one.joint_s or one.drift for one in self.late):
-            plain = joint
+            bare = answer.joint
             if self.lawless is not None:
-                plain = self._step(self.lawless, recording, read, unrecorded).joint
-            late = joint_as_stamped(plain, read.time, recording, self.late, self.joint.drive.ratio)
-            joint = late + (joint - plain)
-        answer = answer._replace(joint=joint)
+                bare = self._step(self.lawless, recording, read, unrecorded).joint
+            seen = joint_as_stamped(bare, read.time, recording, self.late, self.joint.drive.ratio)
+            answer = answer._replace(joint=seen + (answer.joint - bare))
         return answer if own is None else Answer(*(column[own] for column in answer))
 
     def _step(

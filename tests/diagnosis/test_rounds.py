@@ -54,6 +54,8 @@ def test_what_trades_places_with_a_drive_that_is_not_known_is_tried_beside_what_
     rounds._begun(at, worth)
     assert sorted(tried) == [*plain[: LIMITS.tried_later], *trading[:further]]
     assert [a[0].hypothesis.name for a in others] == [*plain[LIMITS.tried_later :], *trading[further:]]
+    at.number = 0
+    assert rounds._worth(at, answers) == (answers, [])  # all are tried at first
 
 
 @pytest.mark.parametrize(("number", "kept"), [(0, ["coat"]), (1, [])])
@@ -171,10 +173,7 @@ def test_a_share_with_a_bound_is_begun_with_most_of_it_as_well(effect: str, shar
         assert values[h.key(amount.name)] == pytest.approx(share)
 
 
-@pytest.mark.parametrize(("number", "tried_too"), [(0, []), (1, ["third", "fourth"])])
-def test_what_is_no_answer_takes_nobodys_place_in_a_later_round(
-    number: int, tried_too: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_no_answer_takes_nobodys_place(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two delays beyond what is plausible had kept a clearance from being tried on a sheath."""
     begun = [SimpleNamespace(name=n, cost=50.0) for n in ("delay", "drift", "friction")]
     compared: list[str] = []
@@ -197,9 +196,9 @@ def test_what_is_no_answer_takes_nobodys_place_in_a_later_round(
     )
     monkeypatch.setattr(rounds, "_ended", ended)
     monkeypatch.setattr(rounds, "_tried", tried)
-    at: Any = SimpleNamespace(model="before", number=number, cost=100.0)
+    at: Any = SimpleNamespace(model="before", number=1, cost=100.0)
     rounds.one_round(at, np.random.default_rng(0))
-    assert compared == ["friction", *tried_too]
+    assert compared == ["friction", "third", "fourth"]
 
 
 @pytest.mark.parametrize(("z", "both"), [(0.0, True), (4.0, True), (6.0, False)])

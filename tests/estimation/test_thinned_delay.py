@@ -28,6 +28,12 @@ def shift(e: Evidence, effect: str, values: dict[str, float], *, every: bool) ->
     return found[e.rows] if every else found
 
 
+def off(e: Evidence, effect: str, values: dict[str, float]) -> float:
+    """What judged rows alone miss of what the effect does, as a share of it (RMS)."""
+    true = shift(e, effect, values, every=True)
+    return float(np.sqrt(np.mean((shift(e, effect, values, every=False) - true) ** 2) / np.mean(true**2)))
+
+
 @pytest.mark.parametrize(
     ("effect", "values"),
     [*(("clock_skew", {"delay_s": late}) for late in (2e-4, 5e-3, 0.03)), ("bearing_friction", DRAG)],
@@ -37,16 +43,14 @@ def test_what_goes_with_speed_is_between_thinned_rows_what_it_is_between_all(
 ) -> None:
     e = gather(JOINT, "one", recorded(), "a", fine_rows=2000, judged_rows=150)
     assert np.median(np.diff(e.at_rows("time_s"))) > 0.03
-    true = shift(e, effect, values, every=True)
-    size = float(np.sqrt(np.mean(true**2)))
-    off = float(np.sqrt(np.mean((shift(e, effect, values, every=False) - true) ** 2)))
-    assert off < 0.03 * size
-    if effect == "clock_skew":
-        return  # its readings are those of all fine rows
+    assert off(e, effect, values) < 0.03
+
+
+def test_a_drag_is_farther_off_by_straight_lines() -> None:
+    e = gather(JOINT, "one", recorded(), "a", fine_rows=2000, judged_rows=150)
     unknown = replace(e)
     unknown.__dict__["motor_rate"] = np.full(len(e.columns["time_s"]), np.nan)
-    straight = float(np.sqrt(np.mean((shift(unknown, effect, values, every=False) - true) ** 2)))
-    assert straight > 2.0 * off  # by straight lines
+    assert off(unknown, "bearing_friction", DRAG) > 2.0 * off(e, "bearing_friction", DRAG)
 
 
 def test_the_motors_speed_is_unknown_where_two_rows_have_one_time() -> None:

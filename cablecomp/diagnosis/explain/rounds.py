@@ -58,10 +58,9 @@ def one_round(at: Beginning, rng: np.random.Generator) -> Round:
     worth, others = _worth(at, answers)
     begun = _begun(at, worth)
     found = _ended(_chosen(*begun, at), at, fine)
-    refused = sum(m is None for m in found)
-    if at.number > 0 and refused and others:  # what is no answer takes nobody's place
-        more, _ = _rough(at, others[:refused])
-        found += _ended([c for c in more if c.cost < at.cost], at, fine)
+    # what is no answer takes nobody's place
+    more, _ = _rough(at, others[: sum(m is None for m in found)])
+    found += _ended([c for c in more if c.cost < at.cost], at, fine)
     tried, away = _tried(found, at, fine, rng)
     if not any(t.difference.z > LIMITS.z_sure for t in _good(tried, at)):
         pairs, _ = _tried(_ended(_pairs(begun[0], at), at, fine), at, fine, rng)
