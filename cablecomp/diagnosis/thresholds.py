@@ -420,6 +420,10 @@ class Thresholds:
     another form of its own (a made-up cable that stiffens in a law of its own: 2.6, the right one); a coupling or a
     clearance, then, has no better word in the other (trials seeds 706 to 803: five of seven such couplings and gaps on
     a bound were right)."""
+    z_no_other: float = 5.0
+    """The same for an effect with a shape on the bound beyond which another would be the better word: every other one,
+    tried in its place, is so far behind that none of them is (`830/1`, a bearing that drags with its load alone, ten
+    and more ahead; of 202 trials that were looked at no other effect is held down there by more than three)."""
     rival_alone: float = 0.25
     """Share of what an effect takes off alone that such another one has to take off alone (the jaw's `L_4/13`: its path
     alone explains most by far, and in its place another friction takes up what the motor's leaves)."""

@@ -23,6 +23,8 @@ from cablecomp.diagnosis.explain.scores import ScoreDifference
 from cablecomp.diagnosis.explain.ties import alone_by_far
 
 LATE = {"late_rad_per_Nm": 1e-3, "lag_s": 0.05}
+MOMENT = {"torque_Nm": 1e-3, "growth_per_Nm": 40.0, "presliding_rad": 1e-4}
+"""A growth that stands on its bound (below)."""
 
 
 @pytest.mark.parametrize(
@@ -161,6 +163,16 @@ def test_a_payload_of_which_no_recording_shows_a_cycle_has_to_be_ahead_of_a_load
         ("series_compliance:late_rad_per_Nm", LATE, True, 0.0, ""),
         ("series_compliance:late_rad_per_Nm", LATE, False, 2.5, ""),
         ("series_compliance:late_rad_per_Nm", LATE, False, 1.5, "another effect is the better word"),
+        # a bearing that drags with its load alone, far ahead of every other effect or not
+        ("bearing_friction", MOMENT, False, 5.0, ""),
+        ("bearing_friction", MOMENT, False, 4.9, "another effect is the better word"),
+        (
+            "bearing_friction",
+            {"torque_Nm": 0.01, "presliding_rad": 1.0},
+            False,
+            9.0,
+            "another effect is the better word",
+        ),
         # which is no coupling's or clearance's
         (
             "strand_friction",
@@ -174,13 +186,16 @@ def test_a_payload_of_which_no_recording_shows_a_cycle_has_to_be_ahead_of_a_load
 def test_a_shape_at_which_another_effect_is_the_better_word_has_no_name_but_alone_or_far_ahead_of_it(
     effect: str, shown: dict[str, float], by_far: bool, lead: float, said: str
 ) -> None:
-    asked = {h.name: h for h in hypotheses(JOINT, gather_body(JOINT, {"a/1": recorded()}).used)}
+    evidence = gather_body(JOINT, {"a/1": recorded()}).used
+    asked = {h.name: h for h in hypotheses(JOINT, evidence)}
     term = asked[effect]
+    most = shown.get("growth_per_Nm", 0.0)
+    bound = SimpleNamespace(base=term.key("growth_per_Nm"), high=most, value=float, vague=False)
     model: Any = SimpleNamespace(
         terms=(term,),
         fit=SimpleNamespace(
-            problem=SimpleNamespace(parameters=(), config=JOINT),
-            x=np.empty(0),
+            problem=SimpleNamespace(parameters=(bound,) if most else (), config=JOINT, evidence=evidence),
+            x=np.full(int(most > 0.0), most),
             values={term.key(name): value for name, value in shown.items()},
         ),
     )

@@ -17,15 +17,21 @@ def another(final: Model, term: Hypothesis, rounds: Sequence[Round], lead: float
     """What is to be said of an effect whose shape stands where another is the better word; "" of any other, and of one
     that is alone by far, but where it is known that the other is none of the catalogue's. What gives way in series
     would be the other of a coupling and a clearance: it is none if it is ahead of its rivals, `lead` standard errors,
-    and not beside the other.
+    and not beside the other. Of another effect with a shape on its upper bound the others were tried in its place:
+    where they are far behind, whatever their forms, none of them is the better word.
     """
     stretched = better_word(final.fit, term)
     if not stretched:
         return ""
-    if term.effect.parameter(stretched).another_is_unlisted:
+    shape = term.effect.parameter(stretched)
+    if shape.another_is_unlisted:
         return f"with this `{stretched}` it stands for physics that has no name here"
     in_series = [t for t in final.terms if isinstance(t, Hypothesis) and t.effect.in_series]
-    ahead = len(in_series) == 1 and term.effect.in_series and lead >= LIMITS.z_unbeaten
+    if term.effect.in_series:
+        ahead = len(in_series) == 1 and lead >= LIMITS.z_unbeaten
+    else:
+        on_high = shape.role != "presliding" and not shape.least_is_another
+        ahead = on_high and lead >= LIMITS.z_no_other
     if ahead or alone_by_far(rounds, term):
         return ""
     return f"with this `{stretched}` another effect is the better word"
