@@ -16,6 +16,7 @@ from cablecomp.diagnosis.explain.held_down import (
     seen_once,
     slight,
     stands_in,
+    tightened,
     too_little,
 )
 from cablecomp.diagnosis.explain.hypotheses import hypotheses
@@ -226,3 +227,24 @@ def test_what_nearly_all_data_choose_alone_is_not_held_down_where_others_do_as_w
     assert slight(model, first, rounds(0.95), none, 0.11) == ""
     assert "without it the others predict" in slight(model, first, rounds(0.8), none, 0.11)
     assert "without it the others predict" in slight(model, other, rounds(0.95), none, 0.11)
+
+
+@pytest.mark.parametrize(
+    ("effect", "anew", "said"),
+    [
+        ("thermal_pretension", True, True),
+        ("pretension_relaxation", True, True),
+        ("pretension_relaxation", False, False),
+        ("termination_backlash", True, False),  # no mounting makes play
+        ("clamp_slip", True, False),  # an event is held against it by its standard errors
+    ],
+)
+def test_what_changes_slowly_has_no_name_where_a_drive_mounted_anew_does_as_well(
+    effect: str, anew: bool, said: bool
+) -> None:
+    columns = recorded()
+    columns["temperature_degC"] = 20.0 + 0.1 * columns["time_s"]
+    asked = {h.name: h for h in hypotheses(JOINT, gather_body(JOINT, {"a/1": columns}).used)}
+    found = tightened(asked[effect], ("a pretension of each session's own",) if anew else ())
+    assert bool(found) is said
+    assert not said or found.startswith("a pretension of each session's own predicts")

@@ -119,3 +119,13 @@ def seen_once(final: Model, term: Hypothesis, lead: float) -> str:
         f"no recording shows a whole cycle, as of a load that is read with a drift, and it is ahead by "
         f"{lead:.1f} standard errors; {LIMITS.z_seen_once:g} are asked for"
     )
+
+
+def tightened(term: Hypothesis, plain: Sequence[str]) -> str:
+    """What is to be said of what changes the pretension slowly, with temperature or time, if a pretension of each
+    session's own does as well (it is among what is `plain`, no effect): cables are tightened anew between two sessions,
+    which have other temperatures, too; "" of any other. An event is held against that by its standard errors."""
+    slow = term.acts_through[0] in ("temperature", "time") and not term.has_instant
+    if not slow or not plain:
+        return ""
+    return f"{' and '.join(plain)} predicts data left out as well"

@@ -19,6 +19,7 @@ from cablecomp.diagnosis.explain.held_down import (
     seen_once,
     slight,
     stands_in,
+    tightened,
     too_little,
 )
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
@@ -129,6 +130,7 @@ def _weighed(
         confidence, why_not = min(confidence, LIMITS.little_told), small
     elif open_to := (
         stands_in(final, term, found.put_in, own)
+        or tightened(term, instead.plain)
         or hardly_ahead(final, term, lead)
         or seen_once(final, term, lead)
         or greased(final, term)
