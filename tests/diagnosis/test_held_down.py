@@ -202,12 +202,39 @@ def test_a_shape_at_which_another_effect_is_the_better_word_has_no_name_but_alon
     )
     alone = SimpleNamespace(term=term, model=model, difference=ScoreDifference(0.95, 9.0, 9.0))
     rounds: Any = [SimpleNamespace(tried=[alone])] if by_far else []
-    found = another(model, term, rounds, lead)
+    found = another(model, term, rounds, lead, 1.0)
     assert said in found
     assert bool(found) is bool(said)
     # beside the clearance that a coupling would be, being ahead of others is not enough
     beside: Any = SimpleNamespace(terms=(term, asked["termination_backlash"]), fit=model.fit)
-    assert bool(another(beside, term, rounds, lead)) is (bool(said) or (term.effect.in_series and not by_far))
+    assert bool(another(beside, term, rounds, lead, 1.0)) is (
+        bool(said) or (term.effect.in_series and not by_far)
+    )
+
+
+@pytest.mark.parametrize(
+    ("of_deflection", "lead", "removes", "held"),
+    [
+        (0.002, 5.0, 0.6, False),
+        (0.002, 4.9, 0.6, True),
+        (0.002, 9.0, 0.4, True),  # which the form of another friction may leave
+        (0.2, 9.0, 1.0, True),  # a hysteresis of the drive
+        (0.05, 0.0, 0.0, False),
+    ],
+)
+def test_a_friction_that_leaps_at_each_reversal_has_its_name_where_it_is_most_and_nothing_comes_near(
+    of_deflection: float, lead: float, removes: float, held: bool
+) -> None:
+    evidence = gather_body(JOINT, {"a/1": recorded()}).used
+    term = next(h for h in hypotheses(JOINT, evidence) if h.name == "bearing_friction")
+    values = {
+        term.key("torque_Nm"): 1e-3,
+        term.key("presliding_rad"): of_deflection * evidence[0].deflection_rad,
+    }
+    problem = SimpleNamespace(parameters=(), config=JOINT, evidence=evidence)
+    fit = SimpleNamespace(problem=problem, x=np.empty(0), values=values)
+    model: Any = SimpleNamespace(terms=(term,), fit=fit)
+    assert bool(another(model, term, [], lead, removes)) is held
 
 
 def test_what_nearly_all_data_choose_alone_is_not_held_down_where_others_do_as_well_together() -> None:

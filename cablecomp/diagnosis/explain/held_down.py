@@ -7,18 +7,19 @@ from collections.abc import Collection, Sequence
 
 from cablecomp.diagnosis.explain.hypotheses import Hypothesis
 from cablecomp.diagnosis.explain.model import Model, Round
-from cablecomp.diagnosis.explain.plausible import better_word, drag_at_speed, drags
+from cablecomp.diagnosis.explain.plausible import better_word, drag_at_speed, drags, leaps
 from cablecomp.diagnosis.explain.scores import ScoreDifference, demanded
 from cablecomp.diagnosis.explain.ties import alone_by_far, surest_alone
 from cablecomp.diagnosis.thresholds import LIMITS
 
 
-def another(final: Model, term: Hypothesis, rounds: Sequence[Round], lead: float) -> str:
+def another(final: Model, term: Hypothesis, rounds: Sequence[Round], lead: float, removes: float) -> str:
     """What is to be said of an effect whose shape stands where another is the better word; "" of any other, and of one
     that is alone by far, but where it is known that the other is none of the catalogue's. What gives way in series
     would be the other of a coupling and a clearance: it is none if it is ahead of its rivals, `lead` standard errors,
     and not beside the other. Of another effect with a shape on its upper bound the others were tried in its place:
-    where they are far behind, whatever their forms, none of them is the better word.
+    where they are far behind, whatever their forms, none of them is the better word; nor of a friction that leaps at
+    each reversal, if it `removes` most of the mismatch: what other frictions' forms leave is less.
     """
     stretched = better_word(final.fit, term)
     if not stretched:
@@ -30,8 +31,11 @@ def another(final: Model, term: Hypothesis, rounds: Sequence[Round], lead: float
     if term.effect.in_series:
         ahead = len(in_series) == 1 and lead >= LIMITS.z_unbeaten
     else:
-        on_high = shape.role != "presliding" and not shape.least_is_another
-        ahead = on_high and lead >= LIMITS.z_no_other
+        if shape.role == "presliding":
+            told = leaps(final.fit, term) and removes > LIMITS.most_of_it
+        else:
+            told = not shape.least_is_another
+        ahead = told and lead >= LIMITS.z_no_other
     if ahead or alone_by_far(rounds, term):
         return ""
     return f"with this `{stretched}` another effect is the better word"

@@ -87,6 +87,12 @@ def drag_at_speed(fit: Fit, h: Hypothesis) -> float:
     return at_speed * fit.problem.config.drive.ratio * float(np.sqrt(np.nanmean(rates**2)))
 
 
+def leaps(fit: Fit, h: Hypothesis) -> bool:
+    """Whether a friction builds up within less of a turn than is its own word."""
+    shape = h.effect.of_role("presliding")
+    return shape is not None and _own(fit, h)[shape.name] < _presliding(fit, h)[0]
+
+
 def _presliding(fit: Fit, h: Hypothesis) -> tuple[float, float]:
     """The turn within which a joint's own friction builds up, at least and at most [rad]: beyond it what gives way is a
     hysteresis of the drive; what leaps at each reversal is what other frictions' forms leave. No bounds beside a drive

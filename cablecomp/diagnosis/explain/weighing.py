@@ -120,7 +120,7 @@ def _weighed(
     removes = _share(selection, most)
     if lacks := untold(final.fit, term, removes, lead):
         confidence, why_not = min(confidence, LIMITS.event_untold), lacks
-    elif other := another(final, term, selection.rounds, lead):
+    elif other := another(final, term, selection.rounds, lead, removes):
         confidence, why_not = min(confidence, LIMITS.beaten_told), other
     elif little := (
         too_little(removes, share_left * _beyond_noise(final.fit)) or _beside_usual(selection, term, most)
