@@ -423,7 +423,7 @@ class Thresholds:
     z_no_other: float = 5.0
     """The same for an effect with a shape on the bound beyond which another would be the better word: every other one,
     tried in its place, is so far behind that none of them is (`830/1`, a bearing that drags with its load alone, ten
-    and more ahead; of 202 trials that were looked at no other effect is held down there by more than three)."""
+    and more ahead; whatever else was held down so in 202 trials that were looked at is ahead by less than three)."""
     most_of_it: float = 0.5
     """Share of the mismatch from which a friction that leaps at each reversal, so far ahead, is no other's form
     (`766/14`, a bearing of Dahl's law within 0.002 of the deflection: all of it, ten and more ahead)."""

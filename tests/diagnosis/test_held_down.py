@@ -25,7 +25,7 @@ from cablecomp.diagnosis.explain.ties import alone_by_far
 
 LATE = {"late_rad_per_Nm": 1e-3, "lag_s": 0.05}
 MOMENT = {"torque_Nm": 1e-3, "growth_per_Nm": 40.0, "presliding_rad": 1e-4}
-"""A growth that stands on its bound (below)."""
+"""A bearing that drags with its load alone; the test has the bound of its growth where that is."""
 
 
 @pytest.mark.parametrize(

@@ -28,15 +28,14 @@ def another(final: Model, term: Hypothesis, rounds: Sequence[Round], lead: float
     if shape.another_is_unlisted:
         return f"with this `{stretched}` it stands for physics that has no name here"
     in_series = [t for t in final.terms if isinstance(t, Hypothesis) and t.effect.in_series]
+    needed = LIMITS.z_no_other
     if term.effect.in_series:
-        ahead = len(in_series) == 1 and lead >= LIMITS.z_unbeaten
+        told, needed = len(in_series) == 1, LIMITS.z_unbeaten
+    elif shape.role == "presliding":
+        told = leaps(final.fit, term) and removes > LIMITS.most_of_it
     else:
-        if shape.role == "presliding":
-            told = leaps(final.fit, term) and removes > LIMITS.most_of_it
-        else:
-            told = not shape.least_is_another
-        ahead = told and lead >= LIMITS.z_no_other
-    if ahead or alone_by_far(rounds, term):
+        told = not shape.least_is_another
+    if (told and lead >= needed) or alone_by_far(rounds, term):
         return ""
     return f"with this `{stretched}` another effect is the better word"
 
@@ -130,6 +129,4 @@ def tightened(term: Hypothesis, plain: Sequence[str]) -> str:
     session's own does as well (it is among what is `plain`, no effect): cables are tightened anew between two sessions,
     which have other temperatures, too; "" of any other. An event is held against that by its standard errors."""
     slow = term.acts_through[0] in ("temperature", "time") and not term.has_instant
-    if not slow or not plain:
-        return ""
-    return f"{' and '.join(plain)} predicts data left out as well"
+    return f"{plain[0]} predicts data left out as well" if slow and plain else ""

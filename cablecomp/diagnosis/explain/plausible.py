@@ -59,10 +59,13 @@ def better_word(fit: Fit, h: Hypothesis) -> str:
         below = p.least_is_another and own[p.name] < p.bounds(fit.problem.config)[0]
         if below or p.is_another(own, h.key(p.name) in on_high):
             return p.name
-        if p.role == "presliding" and not drags(fit, h):
-            least, most = _presliding(fit, h)
-            if own[p.name] > most or 0.0 < own[p.name] < least:
-                return p.name
+    shape = h.effect.of_role("presliding")
+    if (
+        shape is not None
+        and not drags(fit, h)
+        and (own[shape.name] > _presliding(fit, h)[1] or leaps(fit, h))
+    ):
+        return shape.name
     return ""
 
 
@@ -88,9 +91,9 @@ def drag_at_speed(fit: Fit, h: Hypothesis) -> float:
 
 
 def leaps(fit: Fit, h: Hypothesis) -> bool:
-    """Whether a friction builds up within less of a turn than is its own word."""
+    """Whether a friction builds up within so little of a turn that another is the better word."""
     shape = h.effect.of_role("presliding")
-    return shape is not None and _own(fit, h)[shape.name] < _presliding(fit, h)[0]
+    return shape is not None and 0.0 < _own(fit, h)[shape.name] < _presliding(fit, h)[0]
 
 
 def _presliding(fit: Fit, h: Hypothesis) -> tuple[float, float]:
